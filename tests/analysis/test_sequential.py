@@ -7,7 +7,6 @@ import itertools
 import numpy as np
 import pytest
 
-from tests.measure.stop_rule import fixed
 from tests.support import stops
 from tolstat.analysis import binomial
 
@@ -74,6 +73,13 @@ def test_drawn_campaigns_agree_with_the_computation() -> None:
     assert np.mean((lower > p) | (upper < p)) == pytest.approx(1.0 - rule.coverage(p), abs=0.015)
     assert joints.mean() == pytest.approx(rule.joints(p), rel=0.02)
     assert np.mean(count / joints) / p - 1.0 == pytest.approx(rule.bias(p), abs=0.04)
+
+
+def fixed(p: float, width: float) -> int:
+    """Number of joints of a plan without looks: the interval is narrow enough with exactly a share p of them above."""
+    joints = np.arange(1, 1000)
+    lower, upper = binomial.clopper_pearson(p * joints, joints)
+    return int(joints[upper - lower < width][0])
 
 
 def test_it_costs_little_more_than_a_fixed_plan_and_its_share_is_biased_high() -> None:

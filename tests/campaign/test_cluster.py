@@ -19,6 +19,8 @@ import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
+from tests.support.blocks import die
+from tolstat.campaign import pool
 from tolstat.campaign.pool import Work, WorkerDied
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
@@ -119,13 +121,9 @@ def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
 def test_a_cluster_whose_workers_die_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """Dask does not always start workers again."""
     monkeypatch.setattr(cluster_module, "GONE_S", 10.0)
-    with pytest.raises(WorkerDied, match=r"1\d times in a row .* (all those workers died|killed by SIGKILL)"):
+    monkeypatch.setattr(pool, "MAX_FAILURES", 3)
+    with pytest.raises(WorkerDied, match=r"[34] times in a row .* (all those workers died|killed by SIGKILL)"):
         list(map_on_cluster(Work(die), range(20), None, 1, lambda: False))
-
-
-def die(x: int) -> int:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return x
 
 
 def cannot() -> None:

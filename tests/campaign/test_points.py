@@ -10,6 +10,7 @@ import pytest
 
 from tests.support import fakes
 from tolstat import study
+from tolstat.analysis.cycles import duty_cycle
 from tolstat.campaign import extend, replay
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import settings_in_use
@@ -142,27 +143,26 @@ def test_shares_and_limits_may_be_edited_after_the_run(tmp_path, whole):
         assert store.view().at("mid").limits == {"cross1.F": 600.0}
 
 
-def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, whole):
+def test_a_duty_cycle_has_the_cycles_of_each_point_by_its_share_of_the_revolutions(tmp_path, whole):
     path, times, speeds = tmp_path / "duty.h5", (0.5, 0.3, 0.2), (1.0, -2.0, 4.0)
     points = [p._replace(share=t, operation=p.operation.model_copy(update={"speed": s}))
               for p, t, s in zip(POINTS, times, speeds, strict=True)]  # fmt: skip
     run(fake(tuple(points), joint=fakes.Dump(load("cirelli2021", {}, "test").given("json"))), path)
     with ResultFile.open(path) as store:
         view, chosen = store.view(), ["cross1.F_t", "fork2.T_e"]
-        one = load_cycles([view], names=chosen, samples=3)
-        several = load_cycles(view.parts, [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9], chosen, samples=3)
+        one = load_cycles(view, names=chosen, samples=3)
+        each = [load_cycles(part, chosen, samples=3).cycles for part in view.parts]
+        several = duty_cycle(each, [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9])
         np.testing.assert_array_equal(one.status, view.status[:3])
-        with pytest.raises(InputError, match="leave --share out"):
-            load_cycles([view], [1.0])
     assert [name for name, _ in one.duty] == [point.name for point in points]
     np.testing.assert_allclose([share for _, share in one.duty], [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9])
-    np.testing.assert_array_equal(one.cycles.ranges, several.cycles.ranges)
-    np.testing.assert_allclose(one.cycles.repeats, several.cycles.repeats)
+    np.testing.assert_array_equal(one.cycles.ranges, several.ranges)
+    np.testing.assert_allclose(one.cycles.repeats, several.repeats)
     with (
         ResultFile.open(whole) as store,
         pytest.raises(InputError, match=r"without a share of the time\n.*--point low"),
     ):
-        load_cycles([store.view()])
+        load_cycles(store.view())
 
 
 def test_what_needs_one_point_asks_for_it(whole):

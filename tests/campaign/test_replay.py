@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import damage, synthetic
-from tolstat import cli, sampling, study
+from tests.support.reports import call
+from tolstat import sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign import run as campaign
 from tolstat.common.columns import SUBSET
@@ -101,9 +101,6 @@ def test_differences_are_found_and_named(file: Path, tmp_path: Path) -> None:
 
 
 def test_command(file: Path, tmp_path: Path) -> None:
-    def call(*words: object) -> object:
-        return CliRunner().invoke(cli.app, [str(word) for word in words])
-
     done = call("replay", file, "--row", 1, "--out", tmp_path / "trace.csv", "--json")
     assert done.exit_code == 0
     assert done.stderr.endswith("row 1: identical to the stored results, bit for bit\n")

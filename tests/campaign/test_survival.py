@@ -33,14 +33,6 @@ from tolstat.study.model import Solver
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
 
 
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Make the datasets of the fake study, run in one go."""
-    path = tmp_path_factory.mktemp("reference") / "a.h5"
-    fakes.run(fakes.Study(), path, 1)
-    return datasets(path)
-
-
 def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> None:
     """Check that a campaign differs from another one in the results of `rows` only."""
     for name, found in datasets(path).items():
@@ -250,6 +242,11 @@ def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harm
     return found
 
 
+def stop_at_38(counts: Counts) -> None:
+    if counts.done == 38:
+        raise KeyboardInterrupt
+
+
 @pytest.mark.slow
 def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path) -> None:
     study, path, told = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5", []
@@ -259,12 +256,8 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path) -
     with ResultFile.open(path) as store:
         failed = np.flatnonzero(store.status() == Status.NEWTON_FAILED)
 
-    def interrupt(counts: Counts) -> None:
-        if counts.done == 38:
-            raise KeyboardInterrupt
-
     with pytest.raises(campaign.Interrupted):
-        run(1, 1, progress=interrupt, retry=AGAIN, tell=told.append)
+        run(1, 1, progress=stop_at_38, retry=AGAIN, tell=told.append)
     run(2, 1)  # the rows to come know their settings
     assert run(retry=AGAIN, tell=told.append).failed == 0
     assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
@@ -287,12 +280,8 @@ def test_a_second_retry_that_was_stopped_goes_on(tmp_path: Path) -> None:
     run()
     run(retry=Retry((Status.NOT_SETTLED,), {"solver.steps_per_rev": 45}, Options(steps_per_rev=45)), tell=told.append)
 
-    def interrupt(counts: Counts) -> None:
-        if counts.done == 38:
-            raise KeyboardInterrupt
-
     with pytest.raises(campaign.Interrupted):
-        run(1, 1, progress=interrupt, retry=AGAIN, tell=told.append)
+        run(1, 1, progress=stop_at_38, retry=AGAIN, tell=told.append)
     assert run(retry=AGAIN, tell=told.append).failed == 0
     assert told == ["4 joints are simulated again"] * 2
     with ResultFile.open(tmp_path / "a.h5") as store:

@@ -25,14 +25,6 @@ from tolstat.common.tables import Status
 from tolstat.store import ResultFile
 
 
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Make the datasets of the fake study, run in one go."""
-    path = tmp_path_factory.mktemp("reference") / "a.h5"
-    fakes.run(fakes.Study(), path, 1)
-    return datasets(path)
-
-
 @pytest.mark.slow
 def test_values_without_their_status_are_simulated_again(tmp_path: Path, expected: dict[str, bytes]) -> None:
     """A power cut after the values of some joints were on the disk, and before their status was."""

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import damage, fakes, synthetic
-from tolstat import cli, joint, sampling, study
+from tests.support.reports import call
+from tolstat import joint, sampling, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
@@ -24,14 +24,9 @@ from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification
 
-REAL = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "25 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+REAL = (
+    synthetic.HEAD.replace("15 deg", "25 deg")
+    + """[solver]
 steps_per_rev = 12
 [tolerances]
 "pin*.offset_t" = { plus_minus = "0.02 mm", distribution = "normal", cpk = 1.0 }
@@ -42,16 +37,13 @@ seed = 3
 [limits]
 "cross*.F" = "640 N"
 """
+)
 
 
 def written(folder, text=REAL):
     path = folder / "real.toml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def call(*args):
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 @pytest.fixture(scope="module")

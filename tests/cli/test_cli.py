@@ -11,25 +11,19 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import fakes, synthetic
+from tests.support.reports import call
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import WorkerDied
 from tolstat.cli import LISTED
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
-from tolstat.display import text
 from tolstat.store import ResultFile
 
 COMMANDS = tuple(LISTED)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
-
-
-def call(*args):
-    """Run the command in this process."""
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 def unwrapped(text):
@@ -152,10 +146,12 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
         assert set(found["causes"]) == {"newton_failed", "not_settled"}
         assert "2 joints newton_failed: a step failed" in head
         assert f"  hint, for row 58: {found['causes']['newton_failed']['remedy']}" in lines
-    for share, line in zip(shares, table.splitlines()[1:], strict=True):
-        assert line.split("  ")[0] == text.limit(share | {"level": share["limit"]})
-        assert f" {share['above']} of {share['of']} " in line
-        assert share["above"] / share["of"] == pytest.approx(share["estimate"], rel=1e-2)
+    lines_of = {name: line for line in table.splitlines()[1:] for name in line.split("  ")[0].split(", ")}
+    assert lines_of.keys() == {share["load"] for share in shares}
+    for share in shares:
+        valid = share["n"] - share["n_failed"] - share["n_unsettled"]
+        assert f" {share['count']} of {valid} " in lines_of[share["load"]]
+        assert share["count"] / valid == pytest.approx(share["estimate"], rel=1e-2)
         assert share["lower"] <= share["estimate"] <= share["upper"]
     assert bool(shares) == (simulated != 0)
 

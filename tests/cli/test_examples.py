@@ -9,12 +9,13 @@ import webbrowser
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 import tolstat
 from tests.support import synthetic
 from tests.support.environment import ROOT
-from tolstat.cli import LISTED, app
+from tests.support.reports import call
+from tolstat.cli import LISTED
 
 COMMANDS = list(LISTED)
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
@@ -24,11 +25,6 @@ SHORT = {
     "verify": ("--joints", "1"),
 }
 """Options with which an example takes seconds."""
-
-
-def call(*args: object) -> Result:
-    """Run a command in this process."""
-    return CliRunner().invoke(app, [str(arg) for arg in args])
 
 
 def example(command: str) -> list[str]:

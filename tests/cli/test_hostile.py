@@ -71,7 +71,7 @@ def test_a_changed_bit_changes_nothing_without_a_word(tmp_path: Path) -> None:
     """A share of ``python -m tests.measure.corruption``."""
     path = synthetic.store(tmp_path)
     corruption.warm(path, tmp_path / "warm")
-    found, kinds = corruption.search(path, tmp_path / "x", range(20))
+    found, kinds = corruption.search(path, tmp_path / "x", range(10))
     assert not found
     assert min(kinds[kind] for kind in ("same", "refused", "told")) > 2
 
@@ -82,7 +82,7 @@ def test_a_changed_bit_of_an_unfinished_file_ends_in_data_or_one_message(tmp_pat
     with h5py.File(path, "r+") as file:
         file["session/number"][()] = 3  # as a run leaves it that is killed
     corruption.warm(path, tmp_path / "warm")
-    found, kinds = corruption.search(path, tmp_path / "x", range(8))
+    found, kinds = corruption.search(path, tmp_path / "x", range(4))
     assert {one.fault for one in found} <= {corruption.SILENT}
     assert kinds["same"] > 2
 

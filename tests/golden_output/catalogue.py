@@ -11,7 +11,7 @@ MADE = "run"
 """Name of the golden file with what making a campaign said."""
 FORMS = ("", " --wide", " --json")
 COMMANDS = (
-    *("new", "spectrum", "schema", "show", "simulate", "plan"),
+    *("new", "show", "simulate", "plan"),
     *("run", "extend", "merge", "status", "verify", "replay", "evaluate", "report"),
     *(
         "assumptions",
@@ -185,11 +185,13 @@ HELP = Campaign(
         ],
         "new": ["new first", "new shaft --joint own", "new first", "run first.toml --n 4", "simulate first.toml"],
         "spectrum": [
-            "spectrum drive_cycle.csv --out cycle.toml",
-            "spectrum drive_cycle.csv --out other.toml --base iso2768_f.toml --exponent 5",
-            "spectrum overnight.csv --out none.toml",
+            "new cycle --signal drive_cycle.csv",
+            "new other --signal drive_cycle.csv --base iso2768_f.toml --exponent 5",
+            "new none --signal overnight.csv",
+            "new cycle --signal drive_cycle.csv --joint own",
+            "new none --exponent 5",
         ],
-        "schema": ["schema study", "schema joint", "schema case --out case.json"],
+        "schema": ["docs study.schema.json", "docs joint.schema.json", "docs case.schema.json"],
         "show": ["show cirelli2021", "show tilted_pin.toml --columns 1", "show duty_cycle.toml --errors"],
         "plan": [
             "plan iso2768_f.toml --pilot 4",

@@ -105,7 +105,6 @@ WELDED = Campaign(
         "fatigue": [
             *forms("fatigue welded_fork.h5", "fatigue welded_fork.h5 --by 'cross*.F_t'"),
             "fatigue welded_fork.h5 --joints 20 --out equivalent.csv --delivery 50",
-            "fatigue welded_fork.h5 welded_fork.h5 --share 0.5 --share 0.5",
         ],
         "cycles": ["export welded_fork.h5 --pylife cycles.csv", "export welded_fork.h5 --csv joints.csv"],
     },

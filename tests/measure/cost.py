@@ -34,6 +34,7 @@ from studies.precision.measuring import choose, in_turn, machine
 from studies.precision.points import build, cheapest
 from studies.precision.runs import TRUTH, Job, OtherJob, OwnJob, TruthJob
 from tests.measure import kernel_parts
+from tests.measure.commands import say
 from tests.support.kernel_states import Sample, sample
 from tolstat.common.tables import Fidelity, Method, Options, Start, Status
 from tolstat.display.text import align
@@ -239,11 +240,6 @@ def contenders(points: pd.DataFrame, steps_per_rev: int) -> list[list[str]]:
         setting, error = (f"{one['setting']:g}", f"{one['loads_worst']:.1e}") if one else ("none met", "-")
         rows.append([str(name), setting, times[0], error, *times[1:]])
     return rows
-
-
-def say(words: str) -> None:
-    """Print on standard error."""
-    print(words, file=sys.stderr, flush=True)
 
 
 def tables(study: Study, n: int, quick: bool, cold: bool) -> Iterator[Table]:

@@ -39,10 +39,6 @@ def no_histories(*_: object) -> dict[str, HistorySpec]:
     return {}
 
 
-def warm_up(_: Options, __: np.ndarray | None = None) -> None:
-    """Stub: there is nothing to compile."""
-
-
 def peak_bytes() -> int:
     """Largest memory of this process so far."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -57,7 +53,7 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
     source.write_text(text, encoding="utf-8")
     plan, path = study.load(source), folder / "scale.h5"
     small: dict[str, Any] = {"workers": 1, "block": block}
-    stand_in = {"simulate_rows": simulate, "history_specs": no_histories, "warm_up": warm_up}
+    stand_in = {"simulate_rows": simulate, "history_specs": no_histories, "warm_up": fakes.warm_up}
     fakes.replace_functions(pytest.MonkeyPatch(), **stand_in, is_compiled=lambda *_: False)
     campaign.run(study.load(source, n=1000), folder / "first.h5", **small)  # what the code itself takes
     (folder / "first.h5").unlink()

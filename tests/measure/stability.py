@@ -17,8 +17,7 @@ import numpy as np
 
 from tests.conftest import joint_with_law
 from tests.support import trajectory
-from tests.support.stepping import CV_FACTORISED, H_OLD, make_state, reset
-from tests.support.trajectory import advance
+from tests.support.stepping import CV_FACTORISED, H_OLD, advance, make_state, reset
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import LAWS

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.analysis.test_exchanged import ishigami
 from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
 from tolstat.analysis import exchanged, sensitivity
 
@@ -11,10 +12,6 @@ from SALib.analyze import rbd_fast, sobol
 from SALib.sample import sobol as saltelli
 
 PROBLEM = {"num_vars": 3, "names": ["x1", "x2", "x3"], "bounds": [[-np.pi, np.pi]] * 3}
-
-
-def ishigami(x):
-    return np.sin(x[..., 0]) + 7.0 * np.sin(x[..., 1]) ** 2 + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
 
 
 @pytest.mark.parametrize("n", [64, 256, 1024])

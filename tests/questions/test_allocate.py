@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.questions.test_change import TEXT, made, share_of
+from tests.questions.test_change import quick as quick
 from tests.support.two_errors import stand_in
 from tolstat import study
 from tolstat.campaign import blocks
@@ -25,13 +26,6 @@ WHOLE = TEXT.replace(
     "[sampling]", '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }\n[sampling]'
 )
 """Tilts matter much, offsets little, diameters not at all."""
-
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The stand-in takes the place of the solver, in this process."""
-    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
-    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda: None)
 
 
 @pytest.fixture(scope="module")

@@ -9,20 +9,18 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
-from tolstat import sampling, study
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.work import Work
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.joint import perturb
 from tolstat.questions.assumptions import answer as run
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.variations import BETTER, evaluate
 from tolstat.report import headline
 from tolstat.solver import stationary
-from tolstat.store import ResultFile, Writer, what_if
+from tolstat.store import ResultFile, what_if
 
 ASSUMED = """
 [[assumed]]
@@ -79,20 +77,9 @@ def stand_in(params, options, histories="none", n_harmonics=0, slides=0.0, arm=0
     return Simulation(results, {})
 
 
-def loaded(folder, text=TEXT):
-    source = folder / "made.toml"
-    source.write_text(text, encoding="utf-8")
-    return study.load(source)
-
-
 def made(folder, text=TEXT, solver=stand_in):
     """Campaign of a stand-in for the solver."""
-    plan = loaded(folder, text)
-    errors = sampling.draw(plan)
-    file = folder / "made.h5"
-    with Writer.create(file, plan, [errors]) as store:
-        store.write(np.arange(plan.rows), solver(perturb(plan.joint, plan.operation, errors), None))
-    return file
+    return synthetic.simulated_by(solver, folder, text)
 
 
 def stand_in_with(patch, **effects):

@@ -5,12 +5,11 @@ from shlex import quote
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tests.support.cells import body
+from tests.support.reports import call
 from tolstat.analysis import sensitivity
-from tolstat.cli import app
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import SIMULATED, Simulation
 from tolstat.display.answer import Asked, Sentence, Table
@@ -41,10 +40,6 @@ def made(folder, text, name="known"):
         results["F_max"][:-5, 0] = load[:-5]
         store.write(np.arange(store.n), Simulation(results, {}))
     return file
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 def test_known_causes_are_found_with_their_shares(path):
@@ -108,7 +103,7 @@ def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_p
         TEXT.replace('"random"', '"lhs"').replace("seed = 2021", 'seed = 2021\nmethod = "lhs"').replace("3000", "400")
     )
     text += '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
-    done = run("causes", made(tmp_path, text))
+    done = call("causes", made(tmp_path, text))
     assert done.exit_code == 0
     assert "correlated" in done.stderr
     assert "independent samples only" in done.stderr
@@ -123,7 +118,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
         ((sweep,), "not drawn from tolerances"),
         ((path, "--by", "cross9.F"), "is not a load"),
     ):
-        done = run("causes", *arguments)
+        done = call("causes", *arguments)
         assert done.exit_code == 2
         assert text in done.stderr
         assert "hint:" in done.stderr
@@ -185,7 +180,7 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
 def test_capability_without_limits_and_one_joint_in_one_are_refused(tmp_path):
     sweep, few = synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), synthetic.store(tmp_path)
     for arguments, text in (((sweep,), "has no limits"), ((few, "--one-in", 1), "--one-in: 1 is not above one")):
-        done = run("capability", *arguments)
+        done = call("capability", *arguments)
         assert done.exit_code == 2
         assert text in done.stderr
 

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 from scipy.stats import binomtest, norm, ttest_ind, ttest_rel
-from typer.testing import CliRunner
 
 from tests.support import synthetic
+from tests.support.reports import call
 from tolstat.analysis import difference
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
-from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import Simulation, Status
 from tolstat.display.answer import Sentence
@@ -127,10 +126,6 @@ def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):
     return path
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tmp_path):
     wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
@@ -180,12 +175,12 @@ def test_other_seeds_are_not_paired(tmp_path):
 @pytest.mark.slow
 def test_what_cannot_be_compared_is_refused(tmp_path):
     a, sweep = campaign(tmp_path, "a"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    done = run("compare", a, sweep)
+    done = call("compare", a, sweep)
     assert done.exit_code == 2
     assert "not drawn from tolerances" in done.stderr
     blocked = tmp_path / "a_a_compare_shares.csv"
     blocked.mkdir()
-    done = run("compare", a, a, "--out", tmp_path)
+    done = call("compare", a, a, "--out", tmp_path)
     assert done.exit_code == 2
     assert f"{blocked.name}: cannot be written: Is a directory\n  hint: " in done.stderr
     with ResultFile.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:

@@ -43,32 +43,14 @@ from tolstat.study.tolerances import fits, iso
 from tolstat.study.tolerances.correlation import Group
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF
 
-TEXT = (
-    synthetic.HEAD
-    + """[tolerances]
-"pin*.tilt_t" = { iso2768 = "f", nominal = "36.4 mm", distribution = "normal", cpk = 1.0 }
-"pin*.offset_z" = { iso2768 = "f", nominal = "72.8 mm", distribution = "normal", cpk = 1.0 }
-"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }
-
-[sampling]
-n = 400
-seed = 3
-
-[output]
-results = ["*.F_max"]
-
-[limits]
-"cross1.F" = "700 N"
-"""
-)
+HOLES = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
+TEXT = synthetic.TILTS.replace("\n[sampling]", f"{HOLES}\n\n[sampling]")
 N = 400
 SEEDS = 100
 
 
 def loaded(folder, text=TEXT):
-    source = folder / "made.toml"
-    source.write_text(text, encoding="utf-8")
-    return study.load(source)
+    return synthetic.load(folder, text)
 
 
 def stand_in_with(patch):
@@ -86,12 +68,7 @@ def quick(monkeypatch):
 
 def made(folder, text=TEXT, solver=stand_in):
     """Campaign of the stand-in."""
-    plan = loaded(folder, text)
-    errors = sampling.draw(plan)
-    file = folder / "made.h5"
-    with Writer.create(file, plan, [errors]) as store:
-        store.write(np.arange(plan.rows), solver(perturb(plan.joint, plan.operation, errors), None))
-    return file
+    return synthetic.simulated_by(solver, folder, text)
 
 
 @pytest.fixture
@@ -176,7 +153,6 @@ def test_iso_classes_are_followed_where_there_are_any(tmp_path):
 
 
 FIT = 'fit = { basic = "76 mm", code = "F8/h6", distribution = "normal", cpk = 1.0 }'
-HOLES = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
 FITTED = TEXT.replace(HOLES, FIT)
 TABLES = {code: FITTED.replace("F8/h6", code) for code in ("E8/h6", "G8/h6", "F7/h6", "F9/h6")}
 

@@ -26,14 +26,9 @@ OTHERS = "'*.[FT]_max', 'pin1.contact_*', 'psi_max'"
 """Columns that the limits of the invented campaigns need."""
 SAMPLES = 180
 THETA = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
-SLOW = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "25 deg"
-speed = "1 rpm"
-torque = "100 N*m"
-[tolerances]
+SLOW = (
+    synthetic.HEAD.replace("15 deg", "25 deg").replace("500 rpm", "1 rpm")
+    + """[tolerances]
 "pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "normal", cpk = 1.0 }
 "hole*.tilt_t" = { plus_minus = "0.1 deg", distribution = "normal", cpk = 1.0 }
 [sampling]
@@ -42,6 +37,7 @@ seed = 5
 [solver]
 fidelity = "quasistatic"
 """
+)
 
 
 def run(*arguments):

@@ -13,7 +13,7 @@ from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
 from tolstat.common.channels import COMPONENTS, LOAD_HISTORIES, signals_of
 from tolstat.common.tables import Status
-from tolstat.questions.fatigue.duty import Joints
+from tolstat.questions.fatigue.counting import Joints
 from tolstat.solver import histories
 from tolstat.study.fatigue import Fatigue
 

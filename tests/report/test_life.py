@@ -7,9 +7,9 @@ import json
 import pytest
 
 import tolstat
-from tests.cli.test_cli import call
 from tests.questions.test_bearing_life import STUDY
 from tests.support import synthetic, views
+from tests.support.reports import call
 from tolstat.display import text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.support import synthetic
 from tests.support.environment import ROOT
 from tests.support.reports import build
 from tolstat import joint, sampling, study
@@ -119,14 +120,9 @@ def test_a_fuzz_of_joints_far_outside_tolerance(tmp_path: Path) -> None:
     assert (results["status"] == Status.OK).any()
 
 
-TEXT = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "5 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+TEXT = (
+    synthetic.HEAD.replace("15 deg", "5 deg")
+    + """[solver]
 steps_per_rev = 36
 [sampling]
 method = "cases"
@@ -143,6 +139,7 @@ note = "other settings"
 [[variant]]
 name = "last"
 """
+)
 
 
 def load(folder: Path, *changes: tuple[str, str]) -> study.Study:

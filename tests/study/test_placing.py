@@ -61,7 +61,7 @@ def test_every_study_that_is_written_runs_from_another_folder(
     call("change", file, "--set", "pin*.offset_t.cpk=1.2", "--most", 128, "--workers", 1, "--out", far / "named.toml")
     allocate = ("allocate", file, "--target", "P(any limit) < 0.9", "--most", 1024, "--workers", 1)
     call(*allocate, "--out", far / "allocated.toml")
-    call("spectrum", ROOT / "studies" / "drive_cycle.csv", "--base", first, "--out", far / "cycle.toml")
+    call("new", far / "cycle", "--signal", ROOT / "studies" / "drive_cycle.csv", "--base", first)
     call("new", far / "fresh", "--joint", "own")
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

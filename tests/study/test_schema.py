@@ -283,9 +283,9 @@ def test_nothing_is_replaced_but_schemas(tmp_path: Path) -> None:
 
 
 def test_commands_write_what_the_functions_make(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["schema", "case"])
+    done = CliRunner().invoke(app, ["docs", "case.schema.json"])
     assert (done.exit_code, json.loads(done.stdout)) == (0, schema.schema("case"))
-    assert CliRunner().invoke(app, ["schema", "cases"]).exit_code == 2
+    assert CliRunner().invoke(app, ["docs", "cases.schema.json"]).exit_code == 2
     done = CliRunner().invoke(app, ["new", str(tmp_path / "gear"), "--joint", "own"])
     assert (done.exit_code, done.stdout) == (0, "")
     assert f"next: tolstat plan {tmp_path / 'gear.toml'}" in done.stderr

@@ -77,13 +77,13 @@ def test_a_signal_without_torque_has_no_duty_cycle():
         spectra.duty_cycle(*steps((10, 0, 600, 10), (10, 90, 0, 10)), 3.0)
 
 
-def spectrum(*args):
-    return CliRunner().invoke(app, ["spectrum", *map(str, args)])
+def new(*args):
+    return CliRunner().invoke(app, ["new", *map(str, args)])
 
 
 def test_the_study_runs_as_it_stands_and_keeps_what_its_base_says(tmp_path):
     path, base = tmp_path / "cycle.toml", ROOT / "studies" / "duty_cycle.toml"
-    done = spectrum(SIGNAL, "--out", path)
+    done = new(path, "--signal", SIGNAL)
     assert done.exit_code == 0
     assert "damage by revolutions (exponent 3)" in done.stderr.replace("\n    ", " ")
     made = study.load(path)
@@ -93,8 +93,9 @@ def test_the_study_runs_as_it_stands_and_keeps_what_its_base_says(tmp_path):
     assert made.output.histories == "cycles"
     text = base.read_text().replace('"cross*.F at drive" = "2.5 kN"\n', "")
     (tmp_path / "base.toml").write_text(text)
-    assert spectrum(SIGNAL, "--out", path, "--base", tmp_path / "base.toml", "--exponent", 5).exit_code == 0
-    again = study.load(path)
+    again = tmp_path / "again.toml"
+    assert new(again, "--signal", SIGNAL, "--base", tmp_path / "base.toml", "--exponent", 5).exit_code == 0
+    again = study.load(again)
     assert (again.fatigue.starts, again.sampling.n, again.fatigue.points[0].name) == (2e4, 512, "weld corner, fork1")
     assert again.fatigue.visits
 
@@ -103,13 +104,12 @@ def test_nothing_is_written_of_a_signal_or_a_base_with_faults(tmp_path):
     path, signal = tmp_path / "cycle.toml", tmp_path / "signal.csv"
     n = np.arange(20.0)
     write(signal, "time [s],torque [N*m]", n, n)
-    done = spectrum(signal, "--out", path)
+    done = new(path, "--signal", signal)
     assert done.exit_code == 2
     assert "has no column speed" in done.stderr
     assert "has no column alpha" in done.stderr
-    done = spectrum(
-        SIGNAL, "--out", path, "--base", ROOT / "studies" / "duty_cycle.toml"
-    )  # limits at a point of its own
+    base = ROOT / "studies" / "duty_cycle.toml"  # has limits at a point of its own
+    done = new(path, "--signal", SIGNAL, "--base", base)
     assert done.exit_code == 2
     assert "no operating point 'drive'" in done.stderr
     assert not path.exists()

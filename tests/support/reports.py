@@ -1,13 +1,18 @@
-"""What ``tolstat report`` says and writes."""
+"""Commands run in this process; what ``tolstat report`` says and writes."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import NamedTuple
 
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from tolstat.cli import app
+
+
+def call(*words: object) -> Result:
+    """Run a command in this process."""
+    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 class Report(NamedTuple):
@@ -20,7 +25,7 @@ class Report(NamedTuple):
 
 def build(path: Path, *options: object) -> Report:
     """Run the command on a result file, all columns printed."""
-    done = CliRunner().invoke(app, ["report", *map(str, (path, "--wide", *options))])
+    done = call("report", path, "--wide", *options)
     assert done.exit_code == 0, done.output
     lines = done.stderr.replace("\n    ", " ").splitlines()
     files = [Path(line.removeprefix("wrote ")) for line in lines if line.startswith("wrote ")]

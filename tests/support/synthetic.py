@@ -106,6 +106,25 @@ method = "sweep"
 """
 )
 
+TILTS = (
+    HEAD
+    + """[tolerances]
+"pin*.tilt_t" = { iso2768 = "f", nominal = "36.4 mm", distribution = "normal", cpk = 1.0 }
+"pin*.offset_z" = { iso2768 = "f", nominal = "72.8 mm", distribution = "normal", cpk = 1.0 }
+
+[sampling]
+n = 400
+seed = 3
+
+[output]
+results = ["*.F_max"]
+
+[limits]
+"cross1.F" = "700 N"
+"""
+)
+"""A study of the two errors that `two_errors.stand_in` knows."""
+
 
 CONTENTS = {}
 """Small files that were made already, by what they were made from: to write one anew takes a tenth of a second."""
@@ -124,16 +143,34 @@ def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     return path
 
 
+def load(folder, text, name="made"):
+    """Write a study to a folder and load it."""
+    from tolstat import study
+
+    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    return study.load(folder / f"{name}.toml")
+
+
+def simulated_by(solver, folder, text, name="made"):
+    """Make a result file of joints that a stand-in for the solver simulates."""
+    from tolstat import sampling
+    from tolstat.joint import perturb
+    from tolstat.store import Writer
+
+    plan, path = load(folder, text, name), folder / f"{name}.h5"
+    errors = sampling.draw(plan)
+    with Writer.create(path, plan, [errors]) as file:
+        file.write(np.arange(plan.rows), solver(perturb(plan.joint, plan.operation, errors), None))
+    return path
+
+
 def write(folder, text, name, simulated, **kwargs):
     """Write a study and its result file to a folder."""
-    from tolstat import sampling, study
+    from tolstat import sampling
     from tolstat.common.tables import Simulation
     from tolstat.store import Writer
 
-    source = folder / f"{name}.toml"
-    source.write_text(text, encoding="utf-8")
-    plan = study.load(source)
-    path = folder / f"{name}.h5"
+    plan, path = load(folder, text, name), folder / f"{name}.h5"
     table = results(plan.rows, **kwargs)
     rows = np.arange(plan.rows if simulated is None else simulated)
     origin = sampling.origin_blocks(plan, range(plan.rows))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.support.stepping import State, build_advance, make_state, reset
+from tests.support.stepping import State, advance, make_state, reset
 from tolstat.common.tables import Options, Start, Status
-from tolstat.kernel.mechanics import dynamics, linsolve, tangent
+from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
@@ -15,18 +15,6 @@ from tolstat.kernel.revolution.outcome import inside_model
 from tolstat.kernel.revolution.settle import grid_step
 from tolstat.kernel.simd.jit import njit
 from tolstat.solver import simulation
-
-residual, solve, eliminate, assemble = dynamics.residual, linsolve.solve, linsolve.factorise, tangent.assemble
-
-
-@njit
-def factorise(t, q, v, a, cv, ca, par, options, work):
-    """Assemble and factorise the tangent at the state of the last residual."""
-    assemble(cv, ca, cv, par, work)
-    return eliminate(work)
-
-
-advance = build_advance(residual, factorise, solve)
 
 
 @njit

@@ -21,8 +21,6 @@ from tolstat.questions import QUESTIONS
 PLAIN = {
     "Plan": {
         "new": "Write a study with comments that runs as it stands.",
-        "spectrum": "Write a study of the duty cycle in a measured signal.",
-        "schema": "Print the JSON schema of a file, for editors.",
         "show": "Draw a joint, its errors, or one joint of a campaign.",
         "simulate": "Simulate one joint, with and without its errors.",
         "plan": "Predict time, memory and precision of a campaign.",
@@ -40,7 +38,7 @@ PLAIN = {
     "Decide": {},
     "Share": {
         "export": "Export joints, load cycles or statistics to files.",
-        "docs": "Print a page of the documents, or the names of all.",
+        "docs": "Print a page of the documents, or a JSON schema.",
         "cache": "Show where compiled kernels are kept, or remove them.",
     },
 }
@@ -49,7 +47,6 @@ FILES = {
     **dict.fromkeys(("plan", "extend", "merge"), "run"),
     **dict.fromkeys(("replay", "evaluate", "show"), "simulate"),
     **dict.fromkeys(("status", "verify", "export", "report"), "results"),
-    **dict.fromkeys(("schema", "spectrum"), "new"),
     "cache": "docs",
 }
 """Files of commands that have none of their own name."""

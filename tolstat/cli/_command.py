@@ -3,10 +3,10 @@
 Parameters that can be given by position are arguments, keyword-only ones are options; what a type does not say of them
 is their `Opt`. A parameter that is true by default can be switched off: ``--report / --no-report``.
 
-The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
-files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
-simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run`` unless the question
-simulates ``at_once``; it may be either.
+The first parameters of a question say what its command reads: a `View` is FILE, two are A and B. Where the question's
+file has a function ``simulate(source, work, ...)``, its first parameter says what is simulated: a path is FILE, behind
+``--run`` unless the question simulates ``at_once``; of ``Study | Path`` a `Study` is STUDY, whose campaigns the answer
+is about.
 
 Exit codes: 0 success (failed and unsettled joints are results); 1 internal error, dead worker processes, or results
 that `replay` does not reproduce; 2 input that cannot be used; 128 + N stopped by signal N (130 after Ctrl-C).
@@ -28,11 +28,10 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 
 from tolstat.cli._library import points, stores, studies, units
-from tolstat.cli._shared import deliver, fail, progress, session, tell_files, work, write_files
+from tolstat.cli._shared import deliver, fail, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
-from tolstat.display.options import Opt
 from tolstat.questions import Question
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
@@ -94,16 +93,16 @@ def flag_of(parameter: Parameter) -> str:
     return f"--{(opt_of(parameter)[1].name or parameter.name).replace('_', '-')}"
 
 
-def opt_of(parameter: Parameter) -> tuple[Any, Opt]:
+def opt_of(parameter: Parameter) -> tuple[Any, options.Opt]:
     """Type and `Opt` of a parameter."""
     annotation = parameter.annotation
     if get_origin(annotation) is not Annotated:
-        return annotation, Opt()
+        return annotation, options.Opt()
     base, *extra = get_args(annotation)
-    return base, next((opt for opt in extra if isinstance(opt, Opt)), Opt())
+    return base, next((opt for opt in extra if isinstance(opt, options.Opt)), options.Opt())
 
 
-def quantity(text: str, opt: Opt, flag: str) -> float:
+def quantity(text: str, opt: options.Opt, flag: str) -> float:
     """Parse the value of an option that has a unit, such as ``"0.1 %"`` or ``"5 min"``; returns SI.
 
     Raises
@@ -215,9 +214,7 @@ def _limit_mb() -> int:
 
 READS: dict[str, dict[str, Any]] = {
     "view": {"file": options.ResultPath},
-    "views": {"files": options.PointPaths},
     "pair": {"a": options.FirstPath, "b": options.SecondPath},
-    "study": {"source": options.SimulatedPath},
     "either": {"source": options.EitherPath},
 }
 """Arguments of a command by what its question reads."""
@@ -229,18 +226,15 @@ def function_of(question: Question) -> Callable[..., None]:
     of_answer, simulated, only_simulated = _parameters(answer_of), list[Parameter](), list[Parameter]()
     views = [p for p in of_answer.values() if p.annotation is stores.View]
     options_of_answer = [p for p in of_answer.values() if p not in views]
-    several, takes_study, into_file = views[0].kind is Parameter.VAR_POSITIONAL, False, False
+    takes_study = False
     if simulate is not None:
         source, _, *simulated = _parameters(simulate).values()
         only_simulated = [p for p in simulated if p.name not in of_answer]
-        takes_study, into_file = source.annotation is not Path, source.annotation is not studies.Study
-    reads = "pair" if len(views) == 2 else "views" if several else "view"
-    if takes_study:
-        reads = "study" if several and not into_file else "either"
+        takes_study = source.annotation is not Path
+    reads = "pair" if len(views) == 2 else "either" if takes_study else "view"
 
     def run(**arguments: Any) -> None:
-        named = [arguments[name] for name in READS[reads]]
-        sources: list[Path] = named[0] if reads == "views" else named
+        sources: list[Path] = [arguments[name] for name in READS[reads]]
         stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
         point, study_file, out = arguments.get("point") or "", arguments.get("study_file"), arguments["out"]
         only_study = question.study and out is not None and out.suffix == ".toml"
@@ -256,8 +250,7 @@ def function_of(question: Question) -> Callable[..., None]:
             with work(workers=workers, folder=folder, study_file=study_file, point=point) as running:
                 sources = simulate(what, running, **{p.name: arguments[p.name] for p in simulated})
         elif used := [flag_of(p) for p in only_simulated if arguments[p.name] not in (None, p.default)]:
-            ways = {"add --run": into_file, "give a study (TOML)": takes_study}
-            remedy = ", or ".join(way for way, is_open in ways.items() if is_open)
+            remedy = f"add --run{', or give a study (TOML)' * takes_study}"
             holds = f"about a simulation, and {sources[0]} holds its joints already"
             raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {holds}", remedy)])
         with ExitStack() as stack:
@@ -266,11 +259,8 @@ def function_of(question: Question) -> Callable[..., None]:
             seen = [store.view(study_file).at(point) for store in opened]
             with progress(question.name):
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
-            files = []
-            if out is not None:  # first: the reader of a pipe may end early
-                files = write_files(answer, out.with_suffix("") if only_study else out / stem, only_study)
-            deliver(answer, arguments["wide"], arguments["as_json"])
-            tell_files(files)
+            target = out and (out.with_suffix("") if only_study else out / stem)
+            deliver(answer, arguments["wide"], arguments["as_json"], target, only_study)
 
     out_option = options.FolderOrStudy if question.study else options.Results if takes_study else options.Folder
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
@@ -282,8 +272,8 @@ def function_of(question: Question) -> Callable[..., None]:
         parameters.append(_parameter(p.name, Annotated[base, opt._replace(help=texts[p.name])], p.default))
     for name, (annotation, default, applies) in {
         "point": (options.Point, None, reads != "pair"),
-        "study_file": (options.OtherStudy, None, reads not in ("pair", "study")),
-        "run": (options.Run, False, into_file and not question.at_once),
+        "study_file": (options.OtherStudy, None, reads != "pair"),
+        "run": (options.Run, False, simulate is not None and not question.at_once),
         "workers": (options.Workers, None, simulate is not None),
         "out": (out_option, None, True),
         "wide": (options.Wide, False, True),

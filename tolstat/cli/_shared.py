@@ -16,20 +16,28 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import answers, assumptions, compilation, design, points, pool, run, table, works
+from tolstat.cli._library import (
+    answers,
+    assumptions,
+    compilation,
+    design,
+    points,
+    pool,
+    run,
+    studies,
+    table,
+    tables,
+    works,
+)
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
+from tolstat.common.late import pandas as pd
 from tolstat.display.options import Opt
 from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from tolstat.common.tables import Variant
-    from tolstat.display.answer import Answer, Column, Rows
     from tolstat.joint import Joint
-    from tolstat.study import Study
 
 WIDTH = 80
 """Maximum length of a line of prose, characters."""
@@ -136,11 +144,27 @@ def progress(first: str = "") -> Iterator[Display]:
         yield shown
 
 
-def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
-    """Print an answer as JSON, or its tables and leading sentences, and on standard error its notes and warnings."""
+def deliver(
+    answer: answers.Answer, wide: bool, as_json: bool = False, stem: Path | None = None, documents: bool = False
+) -> None:
+    """Write the files of an answer, print it, and tell their names.
+
+    On standard output it is JSON, or tables and leading sentences, with notes on standard error. With a
+    `stem` its files are written, see `Answer.write`, or its `documents` alone.
+    """
+    files: list[Path] = []
+    if stem is not None:  # first: the reader of a pipe may end early
+        with progress("files"):
+            files = answer.write_documents(stem) if documents else answer.write(stem)
     if as_json:
         print_json(answer.values())
-        return
+    else:
+        _print_parts(answer, wide)
+    for path in files:
+        say(f"wrote {path}")
+
+
+def _print_parts(answer: answers.Answer, wide: bool) -> None:
     first = True
     for part in answer.parts:
         if isinstance(part, answers.Table) and part.columns:
@@ -154,25 +178,11 @@ def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
             if part.place == "lead":
                 typer.echo(part.text if wide else textwrap.fill(part.text, WIDTH))
                 first = False
-            elif part.place == "warning":
-                warn(wrapped(f"warning: {part.text}"))
             else:
                 say(part.text)
 
 
-def write_files(answer: Answer, stem: Path, documents: bool = False) -> list[Path]:
-    """Write the files of an answer, see `Answer.write`, or its documents alone; returns them."""
-    with progress("files"):
-        return answer.write_documents(stem) if documents else answer.write(stem)
-
-
-def tell_files(files: Iterable[Path]) -> None:
-    """Tell the names of files that were written."""
-    for path in files:
-        say(f"wrote {path}")
-
-
-def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
+def print_table(columns: Sequence[table.Column], rows: table.Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     text, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
     typer.echo(text)
@@ -227,7 +237,7 @@ def work(**settings: Any) -> Iterator[works.Work]:
         raise typer.Exit(1) from error
 
 
-def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
+def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[tables.Variant] = ()) -> None:
     """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
 
     Of several joints with a warning about the same key the first is printed, and how many others there are.
@@ -242,7 +252,7 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def print_study_notes(path: Path, study: Study) -> None:
+def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
     These are mounting and contact law; measured signals; warnings of its joints, of values that are probably not meant,

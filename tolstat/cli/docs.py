@@ -10,8 +10,9 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._shared import WIDTH, say
-from tolstat.common.errors import Fault, InputError
+from tolstat.cli._library import schemas
+from tolstat.cli._shared import WIDTH, print_json, say
+from tolstat.common.errors import input_error
 from tolstat.common.files import docs_dir
 from tolstat.common.strict import did_you_mean
 from tolstat.display.options import Opt
@@ -22,28 +23,36 @@ PAGE_WIDTH = 100
 
 
 def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
-    """Print a page of the documents, or the names of all.
+    """Print a page of the documents, or a JSON schema.
 
-    With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
-    name of a command, such as causes.
+    Without PAGE, prints the names of all. PAGE is study (all keys of study and joint files), tolerances, tutorial,
+    model, report, or the name of a command, such as causes; or the schema study.schema.json, joint.schema.json or
+    case.schema.json. Editors with Taplo or Tombi complete and check keys by the schema that a TOML file names in its
+    first line: #:schema ./study.schema.json
 
     Example: tolstat docs study
 
     Parameters
     ----------
     page : str, optional
-        Page to read, such as study; without it: the names of all pages, with their titles.
+        Page or schema to print, such as study; without it: the names of all, with their titles.
     """
-    if page is not None:
-        _print_page(page)
-        return
-    width = max(map(len, pages()))
-    for name, file in pages().items():
-        lines = _plain(file.read_text(encoding="utf-8")).splitlines()
-        title = next(line for line in lines if line.startswith("# "))[2:]
-        indent = " " * (width + 2)
-        typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
-    say("next: tolstat docs study")
+    texts = {name: _plain(file.read_text(encoding="utf-8")) for name, file in pages().items()}
+    kinds = {f"{kind}.schema.json": kind for kind in schemas.KINDS}
+    if page in kinds:
+        print_json(schemas.schema(kinds[page]))
+    elif page is not None and page_name(page) in texts:
+        _print_page(texts[page_name(page)])
+    elif page is not None:
+        raise input_error(page, "is not a page", did_you_mean(page, [*texts, *kinds]))
+    else:
+        titles = {name: text[text.index("# ") + 2 :].partition("\n")[0] for name, text in texts.items()}
+        titles |= {name: f"JSON schema of a {kind}, for editors" for name, kind in kinds.items()}
+        width = max(map(len, titles))
+        for name, title in titles.items():
+            indent = " " * (width + 2)
+            typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
+        say("next: tolstat docs study")
 
 
 def pages() -> dict[str, Path]:
@@ -58,12 +67,7 @@ def page_name(file: str) -> str:
     return file.removesuffix(".md").replace("_", "-")
 
 
-def _print_page(name: str) -> None:
-    known = pages()
-    file = known.get(page_name(name))
-    if file is None:
-        raise InputError([Fault(name, "is not a page", did_you_mean(name, list(known)))])
-    text = _plain(file.read_text(encoding="utf-8"))
+def _print_page(text: str) -> None:
     if not sys.stdout.isatty():
         typer.echo(text)
         return

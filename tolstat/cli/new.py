@@ -1,4 +1,4 @@
-"""``tolstat new``, ``schema`` and ``spectrum``: studies to begin with, and schemas by which editors complete keys."""
+"""``tolstat new``: studies to begin with, one of them from a measured signal."""
 
 from __future__ import annotations
 
@@ -8,18 +8,33 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._library import np, schemas, spectra, starter, strict, studies, text
-from tolstat.cli._shared import json_of, say
-from tolstat.common.errors import Fault, InputError
+from tolstat.cli._library import np, spectra, starter, studies, text
+from tolstat.cli._shared import say
+from tolstat.common.errors import Fault, gather, raise_all
+from tolstat.common.files import check_target
 from tolstat.display.options import Opt
+
+EXPONENT = 3.0
+"""Default Wöhler exponent."""
 
 
 def new(
-    name: Annotated[Path, Opt("NAME")] = Path("study"), *, joint: Annotated[str, Opt("JOINT")] = "cirelli2021"
+    name: Annotated[Path, Opt("NAME")] = Path("study"),
+    *,
+    joint: Annotated[str | None, Opt("JOINT")] = None,
+    signal: Annotated[Path | None, Opt("CSV")] = None,
+    exponent: Annotated[float | None, Opt("M", least=1.0, most=20.0)] = None,
+    base: Annotated[Path | None, Opt("STUDY")] = None,
 ) -> None:
     """Write a study with comments that runs as it stands.
 
     The schema by which editors complete keys is written beside it. Existing studies and joints are not replaced.
+
+    With --signal, operating points are the duty cycle in a measured signal with columns time, torque, speed of the
+    input shaft and misalignment alpha, with units in the header: time [s], torque [N*m], speed [rpm], alpha [deg].
+    Samples are sorted in classes; the 12 classes that do most of the damage, by revolutions and by changes of the
+    torque, become operating points with their shares of the time. The order of their visits is written, too, for
+    tolstat fatigue. Prints the points; what is left out is told.
 
     Example: tolstat new shaft --joint own
 
@@ -27,73 +42,41 @@ def new(
     ----------
     name : Path
         Name of the study, with or without .toml; may begin with a folder.
-    joint : str
-        own: write a joint file, too; or a joint that comes with tolstat.
+    joint : str, optional
+        own: write a joint file, too; or a joint that comes with tolstat; default: cirelli2021.
+    signal : Path, optional
+        Measured signal (CSV) of which the operating points are made.
+    exponent : float, optional
+        Wöhler exponent of the signal's damage, which is proportional to the torque to this power; default: 3.
+    base : Path, optional
+        Study file (TOML) whose operating points those of the signal replace; default: the study of tolstat new.
     """
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
-    for file in starter.write(path, joint):
+    faults: list[Fault] = []
+    if signal is None and (base is not None or exponent is not None):
+        faults.append(Fault("--base, --exponent", "are about a measured signal", "give it, too: --signal CSV"))
+    if signal is not None and joint is not None:
+        faults.append(Fault("--joint", "cannot be used together with --signal", "name a study with the joint: --base"))
+    if signal is not None and path.exists():
+        faults.append(Fault(str(path), "exists", "give the study another name"))
+    with gather(faults):
+        check_target(path)
+    raise_all(faults)
+    if signal is None:
+        files = starter.write(path, joint or "cirelli2021")
+    else:
+        files = [_write_cycle(path, signal, exponent or EXPONENT, base)]
+    for file in files:
         say(f"wrote {file}")
     say(f"next: tolstat plan {quote(str(path))}")
 
 
-def schema(
-    kind: Annotated[str, Opt("study|joint|case")], *, out: Annotated[Path | None, Opt("JSON", writes=True)] = None
-) -> None:
-    """Print the JSON schema of a file, for editors.
-
-    Editors with Taplo or Tombi complete and check keys by the schema that a TOML file names in its first line:
-    #:schema ./study.schema.json
-
-    Example: tolstat schema study --out study.schema.json
-
-    Parameters
-    ----------
-    kind : str
-        File that the schema is for.
-    out : Path, optional
-        Write the schema to a file instead of standard output.
-    """
-    if kind not in schemas.KINDS:
-        remedy = strict.did_you_mean(kind, list(schemas.KINDS))
-        raise InputError([Fault("tolstat schema", f"no file is called {kind!r}", remedy)])
-    content = json_of(schemas.schema(kind))
-    if out is None:
-        typer.echo(content)
-        return
-    say(f"wrote {text.write(content + chr(10), out)}")
-
-
-def spectrum(
-    signal: Annotated[Path, Opt("CSV")],
-    *,
-    out: Annotated[Path, Opt("STUDY", writes=True)],
-    exponent: Annotated[float, Opt("M", least=1.0, most=20.0)] = 3.0,
-    base: Annotated[Path | None, Opt("STUDY")] = None,
-) -> None:
-    """Write a study of the duty cycle in a measured signal.
-
-    The signal has columns time, torque, speed of the input shaft and misalignment alpha, with units in the header: time
-    [s], torque [N*m], speed [rpm], alpha [deg]. Samples are sorted in classes; the 12 classes that do most of the
-    damage, by revolutions and by changes of the torque, become operating points with their shares of the time. The
-    order of their visits is written, too, for tolstat fatigue. Prints the points; what is left out is told.
-
-    Example: tolstat spectrum studies/drive_cycle.csv --out drive_cycle.toml
-
-    Parameters
-    ----------
-    signal : Path
-        Measured signal (CSV).
-    out : Path
-        Study file (TOML) to write.
-    exponent : float
-        Wöhler exponent: damage of a revolution is proportional to the torque to this power.
-    base : Path, optional
-        Study file (TOML) whose operating points are replaced; default: the study of tolstat new.
-    """
+def _write_cycle(path: Path, signal: Path, exponent: float, base: Path | None) -> Path:
+    """Write the study of the duty cycle in a signal, and print the duty cycle."""
     cycle = spectra.read(signal, exponent)
-    content = spectra.text(cycle, signal, out, base)
-    studies.load(out, text=content)  # its faults, before anything is written
-    text.write(content, out)
+    content = spectra.text(cycle, signal, path, base)
+    studies.load(path, text=content)  # its faults, before anything is written
+    text.write(content, path)
     rows = [("point", "alpha", "speed", "torque", "time", "damage")]
     values = (cycle.alpha, cycle.speed, cycle.torque, cycle.time, cycle.damage)
     for name, alpha, speed, torque, time, damage in zip(spectra.names(cycle), *values, strict=True):
@@ -107,5 +90,4 @@ def spectrum(
     changes = f"their cycles of the torque do {text.percent(cycle.changes)} of the damage of those in the signal"
     others = f", {cycle.left_out} with smaller changes of the torque left out" if cycle.left_out else ""
     say(f"{len(cycle.visits)} visits of the points in {cycle.turns:.4g} revolutions{others}; {changes}")
-    say(f"wrote {out}")
-    say(f"next: tolstat run {quote(str(out))}")
+    return path

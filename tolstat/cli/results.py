@@ -14,19 +14,7 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import (
-    deliver,
-    json_of,
-    print_json,
-    print_table,
-    progress,
-    say,
-    tell_files,
-    wrapped,
-    write,
-    write_files,
-    write_frame,
-)
+from tolstat.cli._shared import deliver, json_of, print_json, print_table, progress, say, wrapped, write, write_frame
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import check_target
@@ -37,7 +25,7 @@ from tolstat.display.progress import clock
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tolstat.store import ResultFile, View
+PAGES = (".html", ".htm")
 
 
 def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json: AsJson = False) -> None:
@@ -60,28 +48,25 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
     """
     with progress("reading the file"), library.stores.ResultFile.open(file) as store:
         states = {at.point or "": at.status() for at in store.each()}
-        facts, shares = _facts(store, states), _shares(store.view())
+        facts, view = _facts(store, states), store.view()
+        # joints of a subset simulation are no sample
+        tables = library.exceedance.limit_tables(view) if view.counts.done and view.method != "subset" else []
         if check:
             facts["checked"] = _checked(store)
         reasons = library.remedy.reasons(store, states)
     if as_json:
         causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in reasons}
         hints = {name: {"row": reason.row, "remedy": reason.remedy} for name, reason in causes.items()}
+        shares = [row for table in tables[:1] for row in table.rows]
         print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
     typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in reasons)]))
-    if shares:
-        columns = (
-            library.table.Column("load > limit", lambda row: library.text.limit({**row, "level": row["limit"]})),
-            library.table.Column("above", lambda row: f"{row['above']} of {row['of']}"),
-            library.table.Column("share", lambda row: library.text.percent(row["estimate"])),
-            library.table.Column("95 % interval", lambda row: library.text.span(row["lower"], row["upper"])),
-        )
+    for table in tables[:1]:
         typer.echo()
-        print_table(columns, shares, wide)
+        print_table(table.columns, table.for_people, wide)
 
 
-def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
+def _facts(store: library.stores.ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     facts |= _counts(library.tables.worst_status(list(states.values())))
@@ -106,18 +91,6 @@ def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
     return {state.label: int(np.count_nonzero(states == state)) for state in library.tables.Status}
 
 
-def _shares(view: View) -> list[dict[str, Any]]:
-    """Share of the joints above each limit so far; joints of a subset simulation are no sample."""
-    rows: list[dict[str, Any]] = []
-    for load in view.loads([] if view.method == "subset" else list(view.limits)):
-        share = load.above(view.limits[load.name])
-        if share.n:
-            row = {"load": load.name, "limit": load.limit, "unit": load.unit, "above": share.count}
-            row["of"] = share.n - share.n_failed - share.n_unsettled
-            rows.append(row | {key: float(f"{getattr(share, key):.3g}") for key in ("estimate", "lower", "upper")})
-    return rows
-
-
 def _lines(facts: dict[str, Any]) -> Iterator[str]:
     """Counts and pace; statuses without joints are left out."""
     unchecked = "errors match; results have none while a run is under way, or after one that was killed"
@@ -134,7 +107,7 @@ def _lines(facts: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {value}"
 
 
-def _checked(store: ResultFile) -> bool:
+def _checked(store: library.stores.ResultFile) -> bool:
     """Whether all results have checksums, which match.
 
     Raises
@@ -210,12 +183,6 @@ def verify(
         write_frame(pd.DataFrame(library.joints.joint_rows(verification)), out)
 
 
-if TYPE_CHECKING:
-    from tolstat.store import Reader
-
-PAGES = (".html", ".htm")
-
-
 def export(
     file: ResultPath,
     *,
@@ -283,7 +250,7 @@ def export(
             write(joints, partial(_write_csv, store, nominal), f"{n} joints")
 
 
-def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
+def _write_csv(store: library.stores.Reader, nominal: bool, stream: TextIO) -> None:
     """Write errors and results block by block."""
     out = csv.writer(stream, lineterminator="\n")
     for k, frame in enumerate(library.result_file.in_blocks(store, nominal)):
@@ -334,12 +301,9 @@ def report(
         check_target(stem)
         with progress("report"):
             answer = library.reports.report(view.at(point or ""), accepted)
-        deliver(answer, wide, as_json)
-        if as_json:
-            return
-        if note := library.recorded.note_on_mounting(view.store):
+        deliver(answer, wide, as_json, None if as_json else stem)
+        if (note := library.recorded.note_on_mounting(view.store)) and not as_json:
             say(f"note: {note}")
-        tell_files(write_files(answer, stem))
 
 
 def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:

@@ -7,28 +7,15 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from tolstat.cli import _library as library
-from tolstat.cli._shared import (
-    deliver,
-    print_json,
-    print_study_notes,
-    progress,
-    say,
-    tell_files,
-    work,
-    wrapped,
-    write_files,
-)
+from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 
 def plan(
@@ -223,7 +210,7 @@ def parse_rows(text: str) -> range:
     return range(int(first), int(last))
 
 
-def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
+def simulate(plan: library.studies.Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
     with work() as running:
         shown = running.display
@@ -258,8 +245,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         if report:
             with progress("report"):
                 answer = library.reports.report(store.view())
-            deliver(answer, wide)
-            tell_files(write_files(answer, path.with_suffix("")))
+            deliver(answer, wide, stem=path.with_suffix(""))
         without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
         for reason in without_load:
             say(reason.text)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -17,11 +17,6 @@ from tolstat.cli._shared import print_json, print_warnings, progress, say, warn,
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target, finite
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from tolstat.campaign.replay import CaseResult, Replay
 
 FORMATS = (".svg", ".png", ".pdf")
 MAX_FAULTS = 20
@@ -84,7 +79,7 @@ def replay(
         raise typer.Exit(1)
 
 
-def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_json: bool) -> None:
+def _deliver(result: library.replays.CaseResult, facts: dict[str, Any], out: Path | None, as_json: bool) -> None:
     """Print `facts` and the summary of a joint, a warning if its status is not ok, and write its histories."""
     summary = facts | result.summary()
     if as_json:
@@ -111,7 +106,7 @@ def _largest(largest: dict[str, dict[str, Any]]) -> list[list[str]]:
     return rows if known else [row[:3] for row in rows]
 
 
-def _verdict(again: Replay) -> str:
+def _verdict(again: library.replays.Replay) -> str:
     if not again.differences:
         return f"row {again.row}: identical to the stored results, bit for bit"
     now = again.result.summary()["status"]
@@ -185,7 +180,7 @@ def evaluate(
 
 def read_table(
     path: Path, needed: Sequence[str], units: Mapping[str, str]
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+) -> tuple[dict[str, library.load_units.FloatArray], list[str]]:
     """Read columns of a CSV file: names in the first line, and units in the second if a cell of it is no number.
 
     Parameters

@@ -27,11 +27,11 @@ class Sentence:
     text : str
         The words; of a note, capital letter and full stop may be missing.
     place : str
-        ``lead`` (part of the answer itself), ``note`` (definitions, restrictions), ``warning``.
+        ``lead`` (part of the answer itself) or ``note`` (definitions, restrictions).
     """
 
     text: str
-    place: Literal["lead", "note", "warning"] = "note"
+    place: Literal["lead", "note"] = "note"
 
 
 @dataclass(frozen=True)

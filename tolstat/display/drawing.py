@@ -29,8 +29,6 @@ TITLE = 0.34
 LETTER, KEY = 0.071, 0.5
 """Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
-ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
-"""Look of the line of an accepted share."""
 WORDS: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
 """Look of words on a vertical line."""
 _SETTINGS = {
@@ -241,7 +239,7 @@ def share_bar(
 def accepted(ax: Axes, share: float, y: float) -> None:
     """Draw the accepted share into a panel of horizontal rows, with words at the height y; nothing if there is none."""
     if share > 0.0:
-        ax.axvline(share, **ACCEPTED)
+        ax.axvline(share, color=style.COLOURS[2], lw=1.4, ls=(0.0, (6.0, 2.0)))
         ax.text(share, y, f"accepted {text.percent(share)}", **WORDS)
 
 

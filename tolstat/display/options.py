@@ -39,9 +39,6 @@ class Opt(NamedTuple):
 
 
 ResultPath = Annotated[Path, Opt("FILE", help="Result file (HDF5) of a campaign.")]
-PointPaths = Annotated[
-    list[Path], Opt("FILE", help="Result file (HDF5) of all operating points, or several of one each.")
-]
 FirstPath = Annotated[Path, Opt("A", help="Result file (HDF5) of the first campaign.")]
 SecondPath = Annotated[Path, Opt("B", help="Result file (HDF5) of the second campaign.")]
 SimulatedPath = Annotated[Path, Opt("STUDY", help="Study file (TOML) to simulate.")]

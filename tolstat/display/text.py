@@ -1,4 +1,4 @@
-"""Tables as aligned text, for standard output, and as Markdown, for documents."""
+"""Values, sentences and tables as text: units, intervals, aligned columns, CSV."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.display import table, text
@@ -74,6 +74,27 @@ class Verdict(NamedTuple):
         return {**text.plain(shown), "notes": list(self.notes)}
 
 
+def side_of(interval: Sequence[float], accepted: float) -> str:
+    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
+    low, high = interval
+    if math.isnan(accepted) or math.isnan(low):
+        return ""
+    return "yes" if high <= accepted else "no" if low > accepted else "open"
+
+
+def deciding(bounds: tuple[float, float], accepted: float, needed: Callable[[float], float]) -> str:
+    """Words on the number of joints whose interval excludes the accepted share.
+
+    `needed` gives that number if their share stayed at the end of the `bounds` that is nearer to the accepted share;
+    none helps where that lies between them.
+    """
+    low, high = bounds
+    if low <= accepted <= high:
+        return "no number of joints would decide it"
+    joints = needed(high if high < accepted else low)
+    return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
+
+
 def on_share(
     about: str,
     what: str,
@@ -105,24 +126,21 @@ def on_share(
         Which joints without a result make the share so uncertain that its interval stands alone; empty if none do.
     """
     share = math.nan if undecided else row["estimate"]
-    interval, most, judges = text.span(*ends), text.percent(accepted), not math.isnan(accepted)
+    interval, most, side = text.span(*ends), text.percent(accepted), side_of(ends, accepted)
     numbers = [text.percent(share)] * (not math.isnan(share)) + [interval] * (not math.isnan(ends[0]))
     rest = f"of the joints {what}{''.join(f' ({other})' for other in numbers[1:])}"
     told = f"{(numbers or ['-'])[0]} {rest}"
-    if judges and ends[1] <= accepted:
-        answer, words = "yes", f"at most {most} of the joints {what} ({', '.join(numbers)})"
-    elif judges and ends[0] > accepted:
-        answer, words = "no", f"{told}; {most} is accepted"
-    elif (undecided or reason) and (judges or math.isnan(share)):
+    answer, words = "", rest
+    if side == "yes":
+        answer, words = side, f"at most {most} of the joints {what} ({', '.join(numbers)})"
+    elif side == "no":
+        answer, words = side, f"{told}; {most} is accepted"
+    elif (undecided or reason) and not (math.isnan(accepted) and share == share):
         answer, words = "none", undecided or reason
-    elif judges:
+    elif not math.isnan(accepted):
         lost = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = row.get("bound_lower", share * (1.0 - lost))
         high = row.get("bound_upper", share * (1.0 - lost) + lost)
-        joints = math.inf if low <= accepted <= high else needed(high if high < accepted else low)
-        number = "more joints do not" if math.isinf(joints) else f"{text.number(joints)} joints would"
-        answer, words = "open", f"{told}; {most} is accepted; {number} decide it"
-    else:
-        answer, words = "", rest
+        answer, words = "open", f"{told}; {most} is accepted; {deciding((low, high), accepted, needed)}"
     value = text.capital(WORDS[answer]) if answer else (numbers or ["-"])[0]
     return Verdict(answer, value, words, about=about, share=share, lower=ends[0], upper=ends[1])

@@ -13,12 +13,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import allocation, binomial
-from tolstat.analysis.allocation import EXACT, Design, Mask, Problem
 from tolstat.campaign import stop_rule
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.stop_rule import Statement
-from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, raise_all
@@ -27,13 +24,11 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Budget, Costs, Opt
 from tolstat.questions import shares
-from tolstat.questions.shares import ChangedJoints, Simulation, check_sample, own_joints, study_documents
 from tolstat.store import Writer
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import changes, ladder, scaling, selection, widths
 from tolstat.study import costs as prices
-from tolstat.study.ladder import Ladder
 
 TITLE = "The cheapest tolerances"
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
@@ -64,8 +59,8 @@ LINES = (
 class _Request(NamedTuple):
     """What is asked for: statements to be met, lines that may change, labels of others, most joints of a design."""
 
-    statements: list[Statement]
-    ladders: list[Ladder]
+    statements: list[stop_rule.Statement]
+    ladders: list[ladder.Ladder]
     kept: list[str]
     most: int
 
@@ -156,7 +151,7 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
         parts.append(Listing("[tolerances]", "\n".join(map(scaling.line, entries, entries.values()))))
     parts.append(Sentence("intervals hold together for all looks of the check with 95 %, without the numerical error"))
     unused = view.study.sampling.seed + allocation.ROUNDS + 1  # by the search and by any check
-    documents = study_documents(view.study, ladder.text_of(view.study, chosen, unused))
+    documents = shares.study_documents(view.study, ladder.text_of(view.study, chosen, unused))
     return Answer("allocate", TITLE, [*parts, *documents], facts)
 
 
@@ -178,10 +173,10 @@ class _Run:
         view: View,
         request: _Request,
         altered: dict[str, Altered],
-        simulate: Callable[[Sequence[Change], str], dict[str, Altered]] | None = None,
+        simulate: Callable[[Sequence[sets.Change], str], dict[str, Altered]] | None = None,
     ) -> None:
         self.view, self.request, self._altered, self._simulate = view, request, altered, simulate
-        self.problem = Problem(
+        self.problem = allocation.Problem(
             costs=[np.array([own.cost(k) for k in range(len(own.rungs))]) for own in request.ladders],
             drawn=tuple(own.drawn for own in request.ladders),
             above=lambda designs: self._above(designs, view.study.sampling.seed, request.looks[0]),
@@ -190,12 +185,12 @@ class _Run:
         )
         self.search, self.looks, self.state = allocation.allocate(self.problem, self._fresh, request.looks)
 
-    def _fresh(self, design: Design, number: int, n: int) -> Mask | None:
+    def _fresh(self, design: allocation.Design, number: int, n: int) -> allocation.Mask | None:
         """Joints of a seed that no design before had."""
         found = self._above([design], self.view.study.sampling.seed + 1 + number, n)
         return None if found is None else found[0]
 
-    def _above(self, designs: Sequence[Design], seed: int, n: int) -> list[Mask] | None:
+    def _above(self, designs: Sequence[allocation.Design], seed: int, n: int) -> list[allocation.Mask] | None:
         """Which of the first joints of a seed are above each level with some designs; simulated if they can be."""
         wanted = [self._change(design, seed, n) for design in designs]
         if self._simulate is not None:
@@ -203,7 +198,7 @@ class _Run:
             self._altered = self._simulate(wanted, stage)
         columns = []
         for statement in self.request.statements:
-            joints = ChangedJoints(self.view, statement.limit, self._altered)
+            joints = shares.ChangedJoints(self.view, statement.limit, self._altered)
             abouts = [change.about for change in wanted]
             loads = [joints.base if about["kind"] == sets.AS_DRAWN else joints.of(about) for about in abouts]
             known = [values for values in loads if values is not None and len(values) >= n]
@@ -212,21 +207,21 @@ class _Run:
             columns.append([~(values[:n] <= joints.level) for values in known])  # above, too, without a valid load
         return [np.column_stack(each) for each in zip(*columns, strict=True)]
 
-    def _change(self, design: Design, seed: int, n: int) -> Change:
+    def _change(self, design: allocation.Design, seed: int, n: int) -> sets.Change:
         """Joints of a design; of the campaign as drawn those that it lacks."""
         study, ladders = self.view.study, self.request.ladders
-        exact = [own.line for own, step in zip(ladders, design, strict=True) if step == EXACT]
+        exact = [own.line for own, step in zip(ladders, design, strict=True) if step == allocation.EXACT]
         if len(exact) == 1:
             return sets.stepped(study, exact[0], widths.EXACT, range(n))
         if exact:
             laws = {name: law for line in exact for name, law in widths.changed(study, line, widths.EXACT).items()}
             return sets.with_study(study, replace(study, tolerances=study.tolerances | laws), "all exact", range(n))
         if (design, seed) == (self.problem.drawn, study.sampling.seed):
-            return sets.as_drawn(study, range(min(own_joints(self.view), n), n))
+            return sets.as_drawn(study, range(min(shares.own_joints(self.view), n), n))
         changed = changes.read(study, ladder.text_of(study, list(zip(ladders, design, strict=True)), seed))
         return sets.with_study(study, changed, self.words(design), range(n))
 
-    def words(self, design: Design) -> str:
+    def words(self, design: allocation.Design) -> str:
         """Design in words: what differs from the drawing."""
         pairs = zip(self.request.ladders, design, strict=True)
         return ", ".join(f"{own.line.label} {own.rungs[k].words}" for own, k in pairs if k != own.drawn) or "as drawn"
@@ -243,7 +238,7 @@ def _path(run: _Run) -> list[dict[str, Any]]:
             own = run.request.ladders[step.line]
             words = (own.rungs[design[step.line]].words for design in (before, step.design))
             row |= dict(zip(none, (own.line.label, *words), strict=True))
-        before = before if EXACT in step.design else step.design
+        before = before if allocation.EXACT in step.design else step.design
         rows.append(row | {"cost": step.cost, "n": len(step.above)} | _shares(step.above.mean(axis=0)))
         if (look := checks.get(number)) is not None:
             row = {"step": len(rows), "what": "check"} | none | {"cost": step.cost, "n": look.n}
@@ -312,9 +307,9 @@ def _verdict(view: View, run: _Run) -> tuple[str, str, float]:
     return look.state, f"{why}: {share} are above; upper end {text.percent(high)}{more}{none}.", misses_by
 
 
-def _others(view: View, statement: Statement, file: str) -> str:
+def _others(view: View, statement: stop_rule.Statement, file: str) -> str:
     """What else than tolerances would keep a limit: values of what is assumed."""
-    joints = ChangedJoints(view, statement.limit, view.altered)
+    joints = shares.ChangedJoints(view, statement.limit, view.altered)
     found = [(joints.share(loads), about["label"]) for about, loads in joints.changes(sets.JOINT)]
     would = [f"{label} ({text.percent(share[0])})" for share, label in found if share[0] < statement.bound]
     return f"What else would: {', '.join(would) or f'tolstat assumptions {file} --run tells'}."
@@ -322,10 +317,8 @@ def _others(view: View, statement: Statement, file: str) -> str:
 
 def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: Sequence[str], most: int) -> _Request:
     """Read targets, costs and names, and report their faults together."""
-    check_sample(view)
-    if view.store.variants:
-        raise shares.unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
-    study, faults, statements = view.study, list[Fault](), list[Statement]()
+    shares.check_one_joint(view)
+    study, faults, statements = view.study, list[Fault](), list[stop_rule.Statement]()
     for target in targets:
         with gather(faults):
             statements.append(stop_rule.parse(target, view.limits, "", "--target", EXAMPLE))
@@ -339,7 +332,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         if not names:
             faults.append(Fault("--keep", f"{pattern!r} selects no error that the study scatters", "see [tolerances]"))
         kept_names |= set(names)
-    every, found = scaling.tolerances(study), list[Ladder]()
+    every, found = scaling.tolerances(study), list[ladder.Ladder]()
     with gather(faults):
         found += ladder.ladders(study, every, prices.of(every, costs))
     raise_all(faults)
@@ -389,9 +382,9 @@ def simulate(
         view = View(store, work.study_file)
         request = _read_request(view, targets, costs, keep or (), most)
         loads = [name for statement in request.statements for name in statement.limit.loads]
-        simulation = Simulation(store, view, work, loads)
+        simulation = shares.Simulation(store, view, work, loads)
 
-        def more(wanted: Sequence[Change], stage: str) -> dict[str, Altered]:
+        def more(wanted: Sequence[sets.Change], stage: str) -> dict[str, Altered]:
             simulation.run(wanted, stage, f"{stage}: ", begin + budget)
             return simulation.altered
 

@@ -20,21 +20,8 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Sentence, Table
 from tolstat.display.options import Accepted, Budget, Opt, Settings
-from tolstat.display.verdict import WORDS
-from tolstat.questions.shares import (
-    ChangedJoints,
-    Simulation,
-    check_sample,
-    estimated,
-    inapplicable,
-    own_joints,
-    sample_of,
-    side_of,
-    study_documents,
-    unusable,
-    with_ends,
-    word,
-)
+from tolstat.display.verdict import WORDS, side_of
+from tolstat.questions import shares
 from tolstat.store import Writer
 from tolstat.store.view import View
 from tolstat.study import changes
@@ -56,15 +43,15 @@ def _shift(row: Row) -> str:
 
 LIMITS = (
     Column("load > limit", text.limit),
-    estimated("before, %", "before"),
-    estimated("after, %", "after"),
-    estimated("change, %", "change", form="+.1f"),
-    Column("joints", word("n"), rank=1),
-    Column("without a load", word("n_failed"), rank=2),
+    shares.estimated("before, %", "before"),
+    shares.estimated("after, %", "after"),
+    shares.estimated("change, %", "change", form="+.1f"),
+    Column("joints", shares.word("n"), rank=1),
+    Column("without a load", shares.word("n_failed"), rank=2),
 )
 """Columns of the table ``limits``."""
 LOADS = (
-    Column("load", word("load")),
+    Column("load", shares.word("load")),
     Column("share below", lambda row: f"{100.0 * row['share']:g} %"),
     Column("before", lambda row: text.value(row["before"], row["unit"])),
     Column("after", lambda row: text.value(row["after"], row["unit"])),
@@ -117,12 +104,12 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
         When the joints are not drawn from tolerances.
     """
     asked = _Asked(view, settings)
-    joints = ChangedJoints(view, view.decisive, view.altered)
+    joints = shares.ChangedJoints(view, view.decisive, view.altered)
     values = joints.of(asked.about)
     if values is None or not np.isfinite(values + joints.base[: len(values)]).any():
         words = " ".join(f"--set {quote(setting)}" for setting in settings)
         remedy = f"simulate them: tolstat change {quote(str(view.path))} {words}"
-        raise inapplicable(view, "holds no joints with this change", remedy)
+        raise shares.inapplicable(view, "holds no joints with this change", remedy)
     n = min(len(values), len(joints.base))
     names = [*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits]
     rows = [_of_limit(view, name, asked) for name in names]
@@ -146,7 +133,7 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
         notes.append("joints are drawn independently here: without lots, Sobol' points or a Latin hypercube")
     if not facts["settled"]:
         notes.append("the difference is not settled: a larger --most or a longer --budget goes on")
-    documents = study_documents(view.study, asked.text)
+    documents = shares.study_documents(view.study, asked.text)
     facts |= {"differs": asked.about["differs"]}
     return Answer("change", TITLE, [*parts, *map(Sentence, notes), *documents], facts)
 
@@ -155,9 +142,7 @@ class _Asked:
     """A change of the study of a campaign: the text and the study that it makes, and its entry in the file."""
 
     def __init__(self, view: View, settings: Sequence[str]) -> None:
-        check_sample(view)
-        if view.store.variants:
-            raise unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
+        shares.check_one_joint(view)
         self.text = changes.with_settings(view.study, settings)
         self.study = changes.read(view.study, self.text)
         self.label = ", ".join("=".join(part.strip() for part in setting.split("=", 1)) for setting in settings)
@@ -168,27 +153,27 @@ class _Asked:
 
 def _of_limit(view: View, name: str, asked: _Asked) -> dict[str, Any]:
     """Row of the table ``limits``."""
-    joints = ChangedJoints(view, name, view.altered)
+    joints = shares.ChangedJoints(view, name, view.altered)
     before, after = _pairs(joints, asked)
     row = {"load": name, "unit": joints.load.unit, "level": joints.level, "n": len(after)}
     row |= {"n_failed": int(np.isnan(before + after).sum())}
-    row |= with_ends("before", joints.share(before)) | with_ends("after", joints.share(after))
-    return row | with_ends("change", joints.difference(before, after))
+    row |= shares.with_ends("before", joints.share(before)) | shares.with_ends("after", joints.share(after))
+    return row | shares.with_ends("change", joints.difference(before, after))
 
 
 def _of_load(view: View, name: str, asked: _Asked) -> list[dict[str, Any]]:
     """Rows of the table ``loads``."""
-    joints = ChangedJoints(view, name, view.altered)
-    before, after = map(sample_of, _pairs(joints, asked))
+    joints = shares.ChangedJoints(view, name, view.altered)
+    before, after = map(shares.sample_of, _pairs(joints, asked))
     rows = []
     for share in QUANTILES:
         found = difference.quantiles(before, after, share, paired=True)
         row = {"load": name, "unit": joints.load.unit, "share": share, "before": found.a, "after": found.b}
-        rows.append(row | with_ends("change", (found.estimate, found.lower, found.upper)))
+        rows.append(row | shares.with_ends("change", (found.estimate, found.lower, found.upper)))
     return rows
 
 
-def _pairs(joints: ChangedJoints, asked: _Asked) -> tuple[FloatArray, FloatArray]:
+def _pairs(joints: shares.ChangedJoints, asked: _Asked) -> tuple[FloatArray, FloatArray]:
     """Load of the same joints before and after."""
     values = joints.of(asked.about)
     assert values is not None
@@ -264,8 +249,8 @@ def simulate(
     begin = time.monotonic()
     with Writer.open(path) as store, kept_workers():
         view = View(store, work.study_file)
-        asked, own = _Asked(view, settings), own_joints(view)
-        simulation = Simulation(store, view, work, view.limits or ("",))
+        asked, own = _Asked(view, settings), shares.own_joints(view)
+        simulation = shares.Simulation(store, view, work, view.limits or ("",))
         n = min(own if LEAST <= own <= most else FIRST, most)
         confidence = 1.0 - 0.05 / (1 + math.ceil(math.log2(max(most / n, 1.0))))
         while True:
@@ -273,7 +258,7 @@ def simulate(
             if n > own:
                 wanted.insert(0, sets.as_drawn(view.study, range(own, n)))
             missing = simulation.run(wanted, asked.label, end=begin + budget)
-            joints = ChangedJoints(view, view.decisive, simulation.altered)
+            joints = shares.ChangedJoints(view, view.decisive, simulation.altered)
             if missing or n >= most or _is_settled(joints, joints.of(asked.about), accepted, confidence):
                 break
             n = min(2 * n, most)
@@ -282,7 +267,7 @@ def simulate(
     return [path]
 
 
-def _is_settled(joints: ChangedJoints, values: FloatArray | None, accepted: float, confidence: float) -> bool:
+def _is_settled(joints: shares.ChangedJoints, values: FloatArray | None, accepted: float, confidence: float) -> bool:
     """Whether it is known what a change does, and on which side of the accepted share it ends."""
     if values is None or not np.isfinite(values + joints.base[: len(values)]).any():
         return False

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import accuracy as comparison
 from tolstat.analysis import ranks
-from tolstat.analysis.accuracy import FIDELITY, KIND_OF, OBSERVABLES, REFERENCE
 from tolstat.campaign.remedy import remedy
 from tolstat.common import load_kinds, units
 from tolstat.common.errors import TolstatError
-from tolstat.common.load_kinds import KIND, LOAD_KINDS
 from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
@@ -299,9 +297,9 @@ def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
         check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
     """
     by_check, kept = errors(verification), _kept(verification)
-    columns = {OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
+    columns = {comparison.OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
     if by_kind:
-        columns = {LOAD_KINDS[k].key: k for k in np.unique(KIND_OF[kept])}
+        columns = {load_kinds.LOAD_KINDS[k].key: k for k in np.unique(comparison.KIND_OF[kept])}
         by_check = {name: comparison.by_kind(values) for name, values in by_check.items()}
     each = ((load, name, *comparison.spread(by_check[name][:, k])) for load, k in columns.items() for name in by_check)
     return [dict(zip(("load", "error", "joints", "median", "usual", "worst"), row, strict=True)) for row in each]
@@ -328,7 +326,7 @@ def joint_rows(verification: Verification) -> Rows:
         other, error = comparison.loads(check.results), comparison.differences(verification.base, check.results)
         states = [Status(code).label for code in check.results["status"]]
         for k in np.flatnonzero(_kept(verification)):
-            fixed = {"load": OBSERVABLES[k], "unit": UNIT_OF_LOAD[OBSERVABLES[k]]}
+            fixed = {"load": comparison.OBSERVABLES[k], "unit": UNIT_OF_LOAD[comparison.OBSERVABLES[k]]}
             values = zip(verification.rows, states, base[:, k], other[:, k], error[:, k], strict=True)
             for row, status, *numbers in values:
                 figures = dict(zip(("campaign", "value", "error"), map(float, numbers), strict=True))
@@ -340,11 +338,11 @@ def error_note(verification: Verification, limits: Iterable[str] = ()) -> str:
     """Sentence on the numerical error of the largest loads: of kinds that every report shows, and those of `limits`."""
     kinds = {load_of(name).kind.key for name in limits}
     total = [row for row in error_rows(verification) if row["error"] == TOTAL]
-    shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
+    shown = [row for row in total if row["load"] in kinds or load_kinds.KIND[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
-    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in LOAD_KINDS}
+    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in load_kinds.LOAD_KINDS}
     words = [f"{called[row['load']]} {row['median']:.1e}, at worst {row['worst']:.1e}" for row in known]
-    noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
+    noun = "error of numerics and fidelity" if comparison.FIDELITY in verification.checks else "numerical error"
     base = verification.base["status"] == Status.OK
     lost = {"": int((~base).sum())}  # joints that failed or did not settle, in the campaign and in each check
     for name, check in verification.checks.items():
@@ -356,8 +354,8 @@ def error_note(verification: Verification, limits: Iterable[str] = ()) -> str:
 def basis(verification: Verification) -> str:
     """Words on how the numerical error was determined."""
     m = len(verification.rows)
-    if REFERENCE in verification.checks:
-        settled = int((verification.checks[REFERENCE].results["status"] == Status.OK).sum())
+    if comparison.REFERENCE in verification.checks:
+        settled = int((verification.checks[comparison.REFERENCE].results["status"] == Status.OK).sum())
         return f"measured on {settled} of {m} joints against a tight reference"
     noun = "joint" if m == 1 else "joints"
     return f"estimated on {m} {noun} from half the step, tighter Newton and longer settling"

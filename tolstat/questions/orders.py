@@ -16,7 +16,6 @@ from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.style import ticker
 from tolstat.questions.shares import ORIGIN, unusable, value, values, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.view import View
@@ -246,7 +245,7 @@ def _bars(ax: Axes, rows: Rows) -> None:
     ax.grid(axis="x", visible=False)
     unit = drawing.loads_axis(ax.yaxis, top, rows[0]["unit"])
     if not unit:
-        ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.3g}"))
+        ax.yaxis.set_major_formatter(style.ticker.FuncFormatter(lambda x, _: f"{x:.3g}"))
     ax.set_ylabel(f"amplitude [{unit or '1'}]")
 
 

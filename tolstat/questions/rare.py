@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.subset import Estimate
 from tolstat.campaign import subset
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.stop_rule import limit_of
-from tolstat.campaign.subset import Subsets
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import special
@@ -117,7 +115,7 @@ def simulate(
     return list(plans)
 
 
-def rare(*views: View, delivery: Delivery = DELIVERY) -> Answer:
+def rare(*views: View, delivery: Delivery = prediction.DELIVERY) -> Answer:
     """Estimate a rare exceedance by subset simulation.
 
     Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
@@ -153,7 +151,7 @@ def rare(*views: View, delivery: Delivery = DELIVERY) -> Answer:
     StoreError
         When a file is none of a subset simulation, or it is not finished.
     """
-    limits = {Subsets(_plan_of(view)).settings.limit for view in views}
+    limits = {subset.Subsets(_plan_of(view)).settings.limit for view in views}
     if len(limits) != 1:
         remedy = "give files of one simulation, which differ in the seed alone"
         raise InputError([Fault(", ".join(str(view.path) for view in views), "are of several limits", remedy)])
@@ -198,7 +196,7 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     sequence of mapping
         Rows of the table ``levels``.
     """
-    store, subsets, unresolved = view.parts[0].store, Subsets(_plan_of(view)), []
+    store, subsets, unresolved = view.parts[0].store, subset.Subsets(_plan_of(view)), []
     walk, settings, before, complete = subsets.walk, subsets.settings, subsets.first, store.complete
     while not walk.done:
         if store.n < subsets.stage.stop or not complete:

@@ -12,11 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial, difference
-from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, NotApplicable, StoreError
@@ -29,7 +27,6 @@ from tolstat.display.table import Column, Row, has
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
-from tolstat.store.what_if import Altered
 from tolstat.study import Study
 from tolstat.study.placing import joint_beside, placed
 from tolstat.study.points import at, names_of
@@ -159,6 +156,13 @@ def check_sample(view: View) -> None:
         raise unusable(view, "holds a part of the campaign only", remedy)
 
 
+def check_one_joint(view: View) -> None:
+    """Refuse what `check_sample` refuses, and a sample of several joints: StoreError."""
+    check_sample(view)
+    if view.store.variants:
+        raise unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
+
+
 def grouped(reasons: Iterable[tuple[str, str]]) -> str:
     """Words on loads and the reason of each: ``cross1.F, cross2.F: reason; fork1.T: other reason``."""
     loads: dict[str, list[str]] = {}
@@ -176,24 +180,12 @@ def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
     loads, above = error_budget.with_error(view, load), load.above(load.limit)
-    row = {"load": load.name, "unit": load.unit, "limit": load.limit, **counts(above)}
+    row: dict[str, Any] = {"load": load.name, "unit": load.unit, "limit": load.limit}
+    row |= {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
     share, low, high = above.estimate, *total_interval(loads, load.limit, CONFIDENCE)
     row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
     row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
     return row | error_budget.delivery(loads, load.limit, delivery, CONFIDENCE)
-
-
-def counts(above: Exceedance) -> dict[str, int]:
-    """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
-    return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
-
-
-def side_of(interval: Sequence[float], accepted: float) -> str:
-    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
-    low, high = interval
-    if math.isnan(accepted) or math.isnan(low):
-        return ""
-    return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
 class Yield(NamedTuple):
@@ -258,7 +250,7 @@ class ChangedJoints:
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
-    def __init__(self, view: View, by: str | Limit, altered: Mapping[str, Altered]) -> None:
+    def __init__(self, view: View, by: str | Limit, altered: Mapping[str, what_if.Altered]) -> None:
         self._study, self._altered = view.study, altered
         if isinstance(by, Limit):
             self.load, self.level = view.load_of(by), by.level
@@ -278,7 +270,7 @@ class ChangedJoints:
         change = self._altered.get(what_if.key(about))
         return None if change is None or change.first else self._of(change)
 
-    def _of(self, altered: Altered) -> FloatArray | None:
+    def _of(self, altered: what_if.Altered) -> FloatArray | None:
         if not all(altered.holds(names) for names, _ in self._parts):
             return None
         return np.asarray(np.maximum.reduce([altered.valid(names) / level for names, level in self._parts]))
@@ -350,7 +342,7 @@ class Simulation:
         options = sets.options_of(self._study, self._store)
         return sets.seconds_per_joint(self._study, options, PILOT, self._asked.points) / self._workers
 
-    def run(self, wanted: Sequence[Change], stage: str, about: str = "", end: float = math.inf) -> int:
+    def run(self, wanted: Sequence[sets.Change], stage: str, about: str = "", end: float = math.inf) -> int:
         """Simulate what the file lacks of some changes until `end` of `time.monotonic`, s; `about` begins the message.
 
         Returns the number of joints that are still missing.

@@ -20,7 +20,6 @@ from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, St
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Figure, Panel, Panels, Part, Row, Rows, Sentence, Sheet, Table, plain
-from tolstat.display.style import ticker
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
@@ -126,7 +125,7 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
     """Draw the loads of one kind at four bushings: ``cross`` or ``fork``."""
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
     ax.set(xlabel=first.head, ylabel=f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
-    ax.xaxis.set_major_locator(ticker.MaxNLocator(6))
+    ax.xaxis.set_major_locator(style.ticker.MaxNLocator(6))
     loads = _kept(view, group, kind)
     if not loads:
         drawing.empty(ax, "not kept by the study")

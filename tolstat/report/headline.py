@@ -13,16 +13,14 @@ from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import table, text
-from tolstat.display.verdict import WORDS, Verdict
+from tolstat.display.verdict import WORDS, Verdict, deciding
 from tolstat.questions import joints, shares
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.variations import Standing
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.rows import ends, share_of, verdict
 from tolstat.questions.fatigue import answer as fatigue
-from tolstat.questions.shares import unresolved_matter
 from tolstat.store.view import View
 
 
@@ -54,7 +52,7 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
         judged = judged._replace(stands_on=sentences.values(standing), notes=(*judged.notes, *filter(None, [more])))
     if judged.answer != "none" and (parts := sentences.of_parts(view, standing)):
         judged = judged._replace(words=f"{judged.words}. {parts}")
-    unresolved = _causes(view) if unresolved_matter(_decisive(view, records)) else ()
+    unresolved = _causes(view) if shares.unresolved_matter(_decisive(view, records)) else ()
     return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
 
@@ -65,16 +63,13 @@ def _deciding(row: table.Row, accepted: float) -> str:
         part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
-    if low <= accepted <= high:
-        return "no number of joints would decide it"
-    joints = binomial.needed(high if high < accepted else low, accepted)
-    return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
+    return deciding((low, high), accepted, lambda end: binomial.needed(end, accepted))
 
 
 def _judged(view: View, records: Sequence[table.Row], accepted: float, standing: Standing | None) -> Verdict:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
-    several, answers = len(records) > 1, [verdict(record, accepted) for record in records]
-    answer = verdict(row, accepted)
+    several, answers = len(records) > 1, [exceedance.verdict(record, accepted) for record in records]
+    answer = exceedance.verdict(row, accepted)
     numbers = ", ".join(f"{answers.count(key)} {word}" for key, word in WORDS.items() if key in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     if answer == "none":
@@ -83,7 +78,9 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
     if first := _without_errors(view):
         words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
     if several and worst["count"]:
-        words += _most_often(view, records, worst)
+        alike = sum(record["estimate"] == worst["estimate"] for record in records) - 1
+        others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
+        words += f". Most often {_limit(view, worst)}: {exceedance.share_of(worst)}{others}"
     if value == WORDS["no"]:
         better = lines.advice(view, row["load"], accepted)
         words += f". {better}" if better else ""
@@ -92,9 +89,9 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
 
 def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing: Standing | None) -> tuple[str, str]:
     """First words and rest of the sentence of a verdict, with what it stands on."""
-    most, share, limit = text.percent(accepted), share_of(row), _words(view, row)
+    most, share, limit = text.percent(accepted), exceedance.share_of(row), _limit(view, row)
     exceed = "" if row["load"] == ANY_LIMIT else f" exceed {limit}"
-    interval = "total interval" if unresolved_matter(row) else text.span(*ends(row))
+    interval = "total interval" if shares.unresolved_matter(row) else text.span(*exceedance.ends(row))
     value, words = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
     behind = sentences.of_variations(standing, answer)
     if standing is not None and any(turned := sentences.turned(standing)):
@@ -105,12 +102,8 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
         if answer == "open" and view.design.independent:
             words += f"; {_deciding(row, accepted)}"
         words += f". {behind}" if behind else ""
-    return value, words + _not_varied(view, standing)
-
-
-def _not_varied(view: View, standing: Standing | None) -> str:
-    missing = sentences.not_varied(standing, view.path.name) if standing else ""
-    return f"; {missing}" if missing else ""
+    missing = sentences.not_varied(standing, view.path.name)
+    return value, words + (f"; {missing}" if missing else "")
 
 
 def _without_errors(view: View) -> str:
@@ -134,23 +127,13 @@ def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
 
 
-def _words(view: View, row: table.Row) -> str:
-    """What joints exceed, in words: one limit, or ``at least one limit``."""
-    return "at least one limit" if row["load"] == ANY_LIMIT else _limit(view, row)
-
-
 def _limit(view: View, row: table.Row) -> str:
     """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
+    if row["load"] == ANY_LIMIT:
+        return "at least one limit"
     limit = f"{text.value(row['level'], row['unit'])} on {row['load']}"
     several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
     return f"{limit} (most often at {view.point_of(row['load'])})" if several else limit
-
-
-def _most_often(view: View, records: Sequence[table.Row], worst: table.Row) -> str:
-    """Sentence on the limit that most joints exceed, and how many others they exceed as often."""
-    alike = sum(row["estimate"] == worst["estimate"] for row in records) - 1
-    others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
-    return f". Most often {_limit(view, worst)}: {share_of(worst)}{others}"
 
 
 def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) -> Verdict:
@@ -161,7 +144,8 @@ def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) 
     if not in_words.decides:
         return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     behind = [sentences.of_variations(standing, ""), text.capital(_without_errors(view))]
-    words = ". ".join([in_words.words + _not_varied(view, standing), *filter(None, behind)])
+    missing = sentences.not_varied(standing, view.path.name)
+    words = ". ".join([in_words.words + (f"; {missing}" if missing else ""), *filter(None, behind)])
     return Verdict("", in_words.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
@@ -169,7 +153,7 @@ def _reason(view: View, records: Sequence[table.Row]) -> str:
     """Why there is no verdict on some limits."""
     lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
     n = max(row["n"] for row in records)
-    if any(map(unresolved_matter, records)):
+    if any(map(shares.unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
     if without := view.design.without_interval("share"):

@@ -14,15 +14,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from studies.precision.measuring import insert, split_page
+from tests.measure.commands import say
 from tests.measure.coverage import page, run
 from tolstat.common.cores import available_cores, limit_threads
 
 MARK = "coverage"
-
-
-def say(words: str) -> None:
-    """Print on standard error."""
-    print(words, file=sys.stderr, flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -15,7 +15,6 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, NotApplicable, gather, raise_all
 from tolstat.display import drawing, style, text
@@ -216,7 +215,7 @@ def simulate(
 
         def run(wanted: Sequence[variations.Variation], number: int) -> None:
             """Simulate what the file lacks of the first joints of some variations."""
-            changes, faults = list[Change](), list[Fault]()
+            changes, faults = list[sets.Change](), list[Fault]()
             for variation in wanted:
                 with gather(faults):
                     changes.append(sets.with_joint(study, variation.keys, range(number)))

@@ -116,9 +116,9 @@ def of_parts(view: View, standing: Standing | None) -> str:
     return max(each)[-1] if each else ""
 
 
-def not_varied(standing: Standing, file: str) -> str:
+def not_varied(standing: Standing | None, file: str) -> str:
     """Words on assumptions that the file has no joints of, with the command that simulates them."""
-    if not standing.missing:
+    if standing is None or not standing.missing:
         return ""
     return f"{_listed(standing.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
 

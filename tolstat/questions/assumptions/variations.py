@@ -14,7 +14,8 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.errors import InputError, TolstatError
 from tolstat.common.loads import FloatArray
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, side_of, unusable, with_ends
+from tolstat.display.verdict import side_of
+from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, unusable, with_ends
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View

@@ -19,11 +19,10 @@ from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolv
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions import shares
 from tolstat.questions.bearing_life import lives as rating
-from tolstat.questions.bearing_life.lives import JOINT, SHARES, Lives
 from tolstat.store.view import View
 
 FEW = "needs more joints"
-PLACE_NAMES = {JOINT: "all four", rating.ANY: "at least one"}
+PLACE_NAMES = {rating.JOINT: "all four", rating.ANY: "at least one"}
 UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
 UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
@@ -49,15 +48,15 @@ def _undecided(row: Row) -> bool:
 BEARING = Column("bearing", lambda row: PLACE_NAMES.get(row["place"], str(row["place"])))
 LIVES = (
     BEARING,
-    Column("nominal", lambda row: _hours(row[SHARES[-1]]["nominal"]), rank=2),
-    *of_shares(SHARES, "reach", lambda row: _hours(row["estimate"]), rank=1),
-    Column(f"95 % interval of {100.0 * SHARES[-1]:g} %", lambda row: _span(row[SHARES[-1]])),
+    Column("nominal", lambda row: _hours(row[rating.SHARES[-1]]["nominal"]), rank=2),
+    *of_shares(rating.SHARES, "reach", lambda row: _hours(row["estimate"]), rank=1),
+    Column(f"95 % interval of {100.0 * rating.SHARES[-1]:g} %", lambda row: _span(row[rating.SHARES[-1]])),
 )
 """Columns of the table ``lives``, arranged by place."""
 LOADS = (
     BEARING,
-    Column("nominal", lambda row: text.value(row[SHARES[-1]]["nominal_load"], "N")),
-    *of_shares(SHARES, "up to", lambda row: text.value(row["load"], "N")),
+    Column("nominal", lambda row: text.value(row[rating.SHARES[-1]]["nominal_load"], "N")),
+    *of_shares(rating.SHARES, "up to", lambda row: text.value(row["load"], "N")),
 )
 """Columns of the table ``loads``, arranged by place."""
 BELOW = (
@@ -114,7 +113,7 @@ def bearing_life(view: View) -> Answer:
     reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
-    rate = lives.rate(JOINT)
+    rate = lives.rate(rating.JOINT)
     if rate.valid.size and rate.valid[0] > 0.0:
         words = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
         parts.append(Panels([Panel("lives", "Life of the joints", words, partial(_draw, lives=lives), (6.4, 3.5))]))
@@ -141,7 +140,7 @@ def bearing_life_on_page(view: View, asked: Asked) -> Answer:
     return bearing_life(view)
 
 
-def _verdict(lives: Lives, below: Rows, reached: Rows) -> list[str]:
+def _verdict(lives: rating.Lives, below: Rows, reached: Rows) -> list[str]:
     """Sentences on the required life, or on why there is none to judge; the first is the answer."""
     if lives.valid and lives.unrated == lives.valid:
         return [f"no rating: {_why_unrated(lives, 'every joint')}"]
@@ -201,7 +200,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     return [judged._replace(notes=tuple(_at_points(lives)))]
 
 
-def _why_unrated(lives: Lives, joints: str) -> str:
+def _why_unrated(lives: rating.Lives, joints: str) -> str:
     each = " at each of its operating points" if len(lives.duty) > 1 else ""
     return (
         f"{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from which on "
@@ -210,11 +209,11 @@ def _why_unrated(lives: Lives, joints: str) -> str:
     )
 
 
-def _angle(lives: Lives, part: float = 1.0) -> str:
+def _angle(lives: rating.Lives, part: float = 1.0) -> str:
     return f"{math.degrees(part * lives.bearing.critical_amplitude):.3g} deg"
 
 
-def _at_points(lives: Lives) -> Iterator[str]:
+def _at_points(lives: rating.Lives) -> Iterator[str]:
     """Sentences on points at which joints swing by less than the critical amplitude, and on a selection of points."""
     for point, number in lives.short.items() if lives.unrated < lives.valid else ():
         time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
@@ -232,7 +231,7 @@ def _at_points(lives: Lives) -> Iterator[str]:
         yield f"as though all of the service were at {' and '.join(lives.duty)}"
 
 
-def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
+def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
     """What the life means, what it leaves out, restrictions."""
     bearing = lives.bearing
     if lives.unrated < lives.valid:
@@ -265,9 +264,9 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
         yield shares.NO_INTERVALS
 
 
-def _draw(ax: Axes, lives: Lives) -> None:
+def _draw(ax: Axes, lives: rating.Lives) -> None:
     """Draw the share of the joints with a shorter life."""
-    rate = lives.rate(JOINT)
+    rate = lives.rate(rating.JOINT)
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]

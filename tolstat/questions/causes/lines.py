@@ -17,7 +17,6 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.style import markers
 from tolstat.questions.causes import shares
-from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.questions.shares import estimated, inapplicable, word
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
@@ -25,9 +24,9 @@ from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 TITLE = "Which line of the drawing to change"
 ON_PAGE = (
     "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle of "
-    "its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. Whiskers and bands are the "
-    "intervals of the table (upper whisker: half as wide; lower: coarser; band: first line). An arrow at the edge of a "
-    "picture: a share or the end of an interval is smaller than what its axis shows."
+    "its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. Whiskers are the intervals of "
+    "the table (upper: half as wide; lower: coarser), the band is that of the joints as drawn. An arrow at the edge of "
+    "the picture: a share or the end of an interval is smaller than what its axis shows."
 )
 FITS_ON_PAGE = (
     "Another fit has the next fundamental deviation or grade of ISO 286; none with which a pin may be larger than its "
@@ -39,8 +38,6 @@ _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 _SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in shares.ENDS))
 
 
-CURVES = 4
-"""Number of lines whose curve has a colour; the others are grey."""
 _BARS = {
     COARSER: ("one step coarser", style.COLOURS[1], 0.3, -0.1),
     HALF: ("half as wide", style.COLOURS[0], 0.56, 0.1),
@@ -147,7 +144,7 @@ def advice(view: View, load: str, accepted: float) -> str:
     return "" if changed is None else sentence(changed, accepted)
 
 
-def sentence(changed: Lines, accepted: float = math.nan) -> str:
+def sentence(changed: shares.Lines, accepted: float = math.nan) -> str:
     """Sentence on the line that lowers the share most, half as wide or with another fit; empty if none surely does.
 
     ``Halve the tilt tolerance of the holes (±0.5 deg) and 2.1 % (1.4 to 3 %) exceed the limit``, without full stop.
@@ -173,7 +170,7 @@ def sentence(changed: Lines, accepted: float = math.nan) -> str:
     return f"No single line is enough: {tried}" + ("" if same is None else f", exact {text.percent(same['share'])}")
 
 
-def _parts(changed: Lines, accepted: float) -> list[Part]:
+def _parts(changed: shares.Lines, accepted: float) -> list[Part]:
     n, share, lower, upper = (changed.facts[name] for name in ("n", "share", "lower", "upper"))
     drawn = f"{changed.event} in {text.percent(share)} ({text.span(lower, upper)}) of {n} joints as drawn"
     rows, by_line, others = changed.rows, changed.by_line, changed.other_fits
@@ -181,7 +178,7 @@ def _parts(changed: Lines, accepted: float) -> list[Part]:
     title, units = f"Share of the joints with {changed.event}, with", dict.fromkeys(_SHARES, "1")
     parts: list[Part] = [
         Sentence(f"{text.sentence(drawn)} {sentence(changed, accepted) or none}.", "lead"),
-        Panels([_tornado(changed, accepted), *_curves(changed, accepted)]),
+        Panels([_tornado(changed, accepted)]),
         Table("lines", f"{title} one line changed", COLUMNS if by_line else (), rows, units, by_line),
     ]
     if others:
@@ -190,14 +187,14 @@ def _parts(changed: Lines, accepted: float) -> list[Part]:
         load = "largest load over its limit" if changed.facts["load"] == ANY_LIMIT else changed.facts["load"]
         load = f"log {load}" if changed.facts["logarithmic"] else load
         heads = f"{load}: alone, %", f"{load}: in all, %", "above: alone, %", "above: in all, %"
-        keys = enumerate(zip(heads, INDICES[::3], strict=True))  # no share is beyond 0 and 1
+        keys = enumerate(zip(heads, shares.INDICES[::3], strict=True))  # no share is beyond 0 and 1
         columns = [LINE, *(estimated(head, key, 3 - i, ends=(0.0, 1.0)) for i, (head, key) in keys)]
         title = f"Part of each line in the scatter of the load, and in whether it is above {changed.limit}"
-        parts.append(Table("line_indices", title, columns, changed.indices, dict.fromkeys(INDICES, "1")))
+        parts.append(Table("line_indices", title, columns, changed.indices, dict.fromkeys(shares.INDICES, "1")))
     return [*parts, *map(Sentence, _notes(changed))]
 
 
-def _notes(changed: Lines) -> Iterator[str]:
+def _notes(changed: shares.Lines) -> Iterator[str]:
     """Definitions, and what the table lacks: joints, steps, lines without joints, lines that are not changed."""
     limit, least = changed.limit, dict[str, int]()
     for row in changed.rows:
@@ -234,7 +231,7 @@ def _phrase(row: Row) -> str:
     return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
 
 
-def _tornado(changed: Lines, accepted: float) -> Panel:
+def _tornado(changed: shares.Lines, accepted: float) -> Panel:
     """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
     by_line, fits = changed.by_line, changed.other_fits
     halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in by_line)
@@ -243,7 +240,9 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in by_line]
     labels += [f"{row['step']}\nin place of {row['size']}" for row in fits]
     drawn, lower, upper = (changed.facts[name] for name in ("share", "lower", "upper"))
-    floor = _floor(changed, accepted)
+    # the axis begins below all shares that are not zero, and below the accepted share
+    positive = [value for value in (*(row["share"] for row in changed.rows), drawn, accepted) if value > 0.0]
+    floor = float(0.6 * max(min(positive, default=1.0), 0.5 / max(changed.facts["n"], 1)))
 
     def draw(ax: Axes) -> None:
         ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
@@ -269,49 +268,3 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     description = f"As drawn {text.percent(drawn)}. {description}"
     size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + 0.48
     return Panel(f"lines-{changed.facts['load']}", title, description, draw, size, rows=labels)
-
-
-def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
-    """Share above the level against the width of each line; none without a line whose width is changed."""
-    by_line: dict[str, list[Row]] = {}
-    for row in changed.rows:
-        if np.isfinite(row["factor"]):
-            by_line.setdefault(row["line"], []).append(row)
-    if not by_line:
-        return
-    floor, facts = _floor(changed, accepted), changed.facts
-    drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
-
-    def draw(ax: Axes) -> None:
-        style.share_axis(ax, floor)
-        top = floor
-        for i, (line, rows) in enumerate(by_line.items()):
-            ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
-            x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
-            top, grey = max(top, float(y.max())), i >= CURVES
-            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[i], style.DASHES[i])
-            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6, "marker": "o", "ms": 3.0}
-            ax.plot(x, np.maximum(y, floor), label="the other lines" if grey else line, **look)
-            at_edge = np.full(int((y < floor).sum()), floor)
-            ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
-            if i == 0:
-                ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
-        ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
-        ax.set_ylim(floor, min(1.0, 2.0 * top))
-        if accepted > 0.0:
-            ax.axhline(accepted, label=f"accepted {text.percent(accepted)}", **drawing.ACCEPTED)
-        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
-
-    title, words = "The share against the width of each line", []
-    for line, rows in by_line.items():
-        points = (f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
-        words.append(f"{line}: {', '.join(points)}")
-    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, (drawing.WIDTH, 4.0))
-
-
-def _floor(changed: Lines, accepted: float) -> float:
-    """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
-    least = [
-        value for value in [*(row["share"] for row in changed.rows), changed.facts["share"], accepted] if value > 0.0
-    ]
-    return float(0.6 * max(min(least, default=1.0), 0.5 / max(changed.facts["n"], 1)))

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import sensitivity
-from tolstat.analysis.sensitivity import FirstOrder
 from tolstat.common.channels import CHANNELS, histories_of
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import FloatArray, unit_text
@@ -123,7 +122,7 @@ def _evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.in
     return view.nominal_slots[view.nominal["status"] == Status.OK], samples
 
 
-def _at_peak(band: Band, errors: Sequence[str], index: FirstOrder) -> str:
+def _at_peak(band: Band, errors: Sequence[str], index: sensitivity.FirstOrder) -> str:
     """Sentence on the error that explains most of the variance of a load at its peak, alone; `index` there."""
     top, unit = f"{band.load} has its peak at {math.degrees(band.theta[band.peak]):.0f}°", CHANNELS[band.load].unit
     top += f", where 5 % of the joints exceed {text.value(band.spread[2, band.peak], unit)}"

@@ -20,7 +20,6 @@ from tolstat.store.view import View
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import of as prices_of
 from tolstat.study.tolerances.correlation import Group
-from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
@@ -65,18 +64,18 @@ class Lines(NamedTuple):
         """
         lines: dict[str, dict[str, Any]] = {}
         for row in self.rows:
-            if (step := row["step"]) in STEPS:
+            if (step := row["step"]) in widths.STEPS:
                 line = lines.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []})
                 line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
                 line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
                 line |= {f"{step}_cost": row.get("extra_cost", np.nan)}
-                line["by"] += [row["words"]] if step in (FINER, COARSER) else []
+                line["by"] += [row["words"]] if step in (widths.FINER, widths.COARSER) else []
         return list(lines.values())
 
     @property
     def other_fits(self) -> Rows:
         """Those of `rows` that have another fit."""
-        return [row for row in self.rows if row["step"] not in STEPS]
+        return [row for row in self.rows if row["step"] not in widths.STEPS]
 
     @property
     def event(self) -> str:
@@ -97,7 +96,7 @@ class Lines(NamedTuple):
 
 def is_decisive(step: str) -> bool:
     """Whether a line has its place in the order by this step: half as wide, or another fit."""
-    return step == HALF or step not in STEPS
+    return step == widths.HALF or step not in widths.STEPS
 
 
 def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
@@ -191,15 +190,15 @@ class Joints(ChangedJoints):
         for line, steps in by_line.items():
             head = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
             for step, (about, values) in steps.items():
-                half = steps[HALF][1] if step in (EXACT, FINER) and HALF in steps else None
+                half = steps[widths.HALF][1] if step in (widths.EXACT, widths.FINER) and widths.HALF in steps else None
                 share, change = self.estimates(values, half)
                 factors = {entry.get("factor", np.nan) for entry in about["tolerances"].values()}
                 row = {**head, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
                 rows.append(row | with_ends("share", share) | with_ends("change", change))
-                rank = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
+                rank = 0 if is_decisive(step) else 1 if step == widths.EXACT else 2, share[0]
                 ranks[line.label] = min(ranks.get(line.label, rank), rank)
-        of_step = {step: (i, 0.0) for i, step in enumerate(STEPS)}
+        of_step = {step: (i, 0.0) for i, step in enumerate(widths.STEPS)}
 
         def order(row: Row) -> Any:
             return *ranks[row["line"]], row["line"], of_step.get(row["step"], (0, row["share"]))

@@ -15,7 +15,6 @@ import numpy as np
 
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display.options import Load, Opt
@@ -26,7 +25,6 @@ from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import widths
 from tolstat.study.tolerances.correlation import Group
-from tolstat.study.widths import STEPS
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
 """Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
@@ -155,7 +153,7 @@ class _Looks:
             self._simulation.seconds = (left - self._left) / done
         return shares.Joints(self._view, self._load, self._simulation.altered).settled(self._lines, confidence)
 
-    def _wanted(self, n: int, decisive: bool) -> list[Change]:
+    def _wanted(self, n: int, decisive: bool) -> list[sets.Change]:
         """Sets of a look, what the order needs first."""
         study, lines = self._view.study, self._lines
         wanted = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
@@ -163,7 +161,7 @@ class _Looks:
             joints = shares.Joints(self._view, self._load, self._simulation.altered)
             return wanted + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
         changes = [(line, step) for line in lines for step in widths.steps(study, line)]
-        changes.sort(key=lambda change: STEPS.index(change[1]) if change[1] in STEPS else 0)
+        changes.sort(key=lambda change: widths.STEPS.index(change[1]) if change[1] in widths.STEPS else 0)
         wanted += [sets.stepped(study, line, step, range(n)) for line, step in changes]
         for line in lines:
             inside = np.array([name in line.names for name in study.copula.names], bool)

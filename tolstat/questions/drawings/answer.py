@@ -18,7 +18,6 @@ from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
-from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
@@ -118,7 +117,7 @@ def _worst(view: View) -> list[Panel]:
 
 def read(
     source: str | Path, row: int | None = None, alpha: str | None = None
-) -> tuple[Joint, float, str, NDArray[np.void] | None]:
+) -> tuple[joints.Joint, float, str, NDArray[np.void] | None]:
     """Read the joint to be drawn.
 
     Parameters
@@ -148,7 +147,7 @@ def read(
     """
     path, errors, point = Path(source), None, ""
     asked_alpha = validate(
-        Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha"
+        joints.Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha"
     ).alpha
     if path.is_file() and path.suffix != ".toml":
         with ResultFile.open(path) as store:
@@ -174,7 +173,7 @@ def read(
     return joint, asked_alpha if alpha else own_alpha, f"{title}, at {point}" if point else title, errors
 
 
-def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
+def draw_joint(joint: joints.Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
     """Draw a joint from its dimensions: the cross in its holes, both shafts, bushings, dimensions.
 
     Parameters
@@ -196,12 +195,12 @@ def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) ->
     return drawing.sheet(views.views(joint, alpha), title or joint.description or "Cardan joint", NOTES, columns)
 
 
-def draw_errors(joint: Joint) -> Figure:
+def draw_errors(joint: joints.Joint) -> Figure:
     """Draw what a positive error of each kind means, on pin 1 and hole 4 of a joint."""
     return drawing.sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
 
 
-def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
+def draw_row(joint: joints.Joint, errors: NDArray[np.void], title: str = "") -> Figure:
     """Draw the errors of one joint, enlarged together with its clearances.
 
     Parameters
@@ -217,7 +216,7 @@ def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
     return drawing.sheet([panel], title or "Errors of one joint", ROW)
 
 
-def lengths(joint: Joint, alpha: float) -> Rows:
+def lengths(joint: joints.Joint, alpha: float) -> Rows:
     """Dimensions on the drawing: ``dimension``, ``value`` with its unit, ``meaning``."""
     arm, contact = joint.arm, joint.contact
     rows = [

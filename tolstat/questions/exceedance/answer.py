@@ -17,7 +17,6 @@ from tolstat.joint.perturbation import one_force
 from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
-from tolstat.questions.exceedance.rows import verdict
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
@@ -127,12 +126,13 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     if not (view.sampled and view.limits):
         remedy = "give the result file of a study with [limits] whose joints are drawn from tolerances"
         raise shares.inapplicable(view, "has no limits, or its joints are no sample", remedy)
-    table, *others = limit_tables(view, accepted)
+    table, *at_points = limit_tables(view, accepted)
     panel = forest_panel(table.for_people, accepted)
     how = list(map(Sentence, _how(view, accepted)))
-    parts: list[Part] = [Panels([panel], beside=how), table, *others]
+    parts: list[Part] = [Panels([panel], beside=how), table, *at_points]
     rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
-    if any(_is_notable(row) for row in rows):
+    others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
+    if any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for other, row in zip(others, rows, strict=True)):
         title = "What makes the shares above limits uncertain, in per cent of the joints"
         parts.append(Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate")))
     return Answer("limits", "Each limit", parts)
@@ -174,9 +174,9 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
         return []
     rows, is_judged = of.limit_rows(view), not math.isnan(accepted)
     if is_judged:
-        rows = [{**row, "verdict": WORDS[verdict(row, accepted)]} for row in rows]
+        rows = [{**row, "verdict": WORDS[of.verdict(row, accepted)]} for row in rows]
     seen = one_force(rows, "level", "estimate")
-    verdicts = [verdict(row, accepted) for row in seen] if is_judged else ()
+    verdicts = [of.verdict(row, accepted) for row in seen] if is_judged else ()
     tables = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
@@ -257,12 +257,6 @@ def _how(view: View, accepted: float) -> Iterator[str]:
             "it lies above. It has no verdict where joints without a valid load decide, and is open otherwise. The "
             "verdict at the top is on the joints that exceed at least one limit."
         )
-
-
-def _is_notable(row: Row) -> bool:
-    """Whether something else makes a share uncertain by more than `NOTABLE` of its interval of sampling."""
-    other = max(_numerical(row), row["bound_upper"] - row["bound_lower"])
-    return bool(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]))
 
 
 def _numerical(row: Row) -> float:

@@ -12,6 +12,7 @@ from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
+from tolstat.display.verdict import side_of
 from tolstat.questions.shares import unresolved_matter
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -194,15 +195,11 @@ def verdict(row: Row, accepted: float) -> str:
         ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
         decide, so that more joints do not help; empty without an accepted share.
     """
-    if np.isnan(accepted):
-        return ""
-    low, high = ends(row)
-    if np.isnan(low):
-        return "none"
-    if high <= accepted or low > accepted:
-        return "no" if low > accepted else "yes"
+    side = side_of(ends(row), accepted)
+    if np.isnan(accepted) or side in ("yes", "no"):
+        return side
     undecided = row["bound_lower"] <= accepted < row["bound_upper"]
-    return "none" if not row["n"] or (undecided and unresolved_matter(row)) else "open"
+    return "none" if not (side and row["n"]) or (undecided and unresolved_matter(row)) else "open"
 
 
 def ends(row: Row) -> tuple[float, float]:

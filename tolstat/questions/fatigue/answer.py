@@ -20,8 +20,6 @@ from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.questions.fatigue import counting, loads, parts
-from tolstat.questions.fatigue.counting import Counted
-from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, channels, load_cycles
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
@@ -48,7 +46,7 @@ def _life(*lives: float) -> str:
 
 
 def _line_of_load(row: Row) -> str:
-    if row["channel"] == ANY:
+    if row["channel"] == counting.ANY:
         return "-"
     return f"{text.value(row['S0'], unit_of(row['channel']))} at {row['N0']:g} cycles, m = {row['m']:g}"
 
@@ -93,8 +91,7 @@ DAMAGES = (
 
 
 def fatigue(
-    *views: View,
-    shares: Annotated[list[float] | None, Opt("S", name="share")] = None,
+    view: View,
     by: Loads = None,
     joints: Annotated[int | None, Opt("N", least=1)] = None,
     delivery: Delivery = prediction.DELIVERY,
@@ -106,20 +103,15 @@ def fatigue(
     simulated again. From cycles of load components, or of a force or moment along a direction: quantiles of the
     damage-equivalent load over the joints, and for each S-N line of a load the share of joints whose damage sum exceeds
     1. Without --by, prints the most loaded component of the force and of the moment of each bushing. All settings are
-    those of [fatigue] in the study of the first FILE.
-
-    The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
-    several files, with the same joints at one operating point each.
+    those of [fatigue] in the study of FILE. Its operating points form a duty cycle, by the share of the time that
+    [[operation]] gives each.
 
     Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
 
     Parameters
     ----------
-    *views : View
-        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
-        each operating point.
-    shares : list of float, optional
-        Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.
+    view : View
+        A campaign, whose operating points are the duty cycle if it has several.
     by : list of str, optional
         Component or direction, such as cross1.F_t, "cross*.F_t", "cross1.F at 30 deg" or "cross1.F at worst";
         repeatable; default: components of bushings.
@@ -139,21 +131,20 @@ def fatigue(
     Raises
     ------
     InputError
-        When the shares are not shares or not known, the campaigns have different joints, or nothing is selected.
+        When the shares of the operating points are not known, or nothing is selected.
     StoreError
-        When the joints of a file are no sample of a production.
+        When the joints are no sample of a production.
     """
-    for view in views:
-        view.check()
-    settings = section(views[0])
-    has_cycles = all(part.store.history_specs for view in views for part in view.parts)
+    view.check()
+    settings = counting.section(view)
+    has_cycles = all(part.store.history_specs for part in view.parts)
     shown_parts: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
     if settings.points:
-        stressed = parts.load_stresses(views, shares or None, joints)
+        stressed = parts.load_stresses(view, joints)
         duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or settings.lines or not settings.points:
-        loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
+        loading = load_cycles(view, channels(by) if by else None, joints)
         rows = loads.equivalent_loads(loading)
         shown = [] if by else loads.most_loaded(rows)
         seen = [row for row in rows if not shown or row["channel"] in shown]
@@ -167,13 +158,13 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
             view.check()
-            settings = section(view)
+            settings = counting.section(view)
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if settings.points and joints:
-                shown_parts += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
+                shown_parts += _of_parts(parts.load_stresses(view, joints), prediction.DELIVERY)
             joints = _joints_with_lines(view, settings, asked.replay)
             if (settings.lines or view.store.history_specs) and joints:
-                loading = load_cycles([view], samples=joints)
+                loading = load_cycles(view, samples=joints)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
@@ -202,17 +193,17 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    settings = section(view)
-    if not (settings.points or settings.lines) or not settings_of(*members([view], None)).required:
+    settings = counting.section(view)
+    if not (settings.points or settings.lines) or not counting.settings_of(view).required:
         return []
     view.check()
     verdicts = []
     if settings.points and (joints := JOINTS if held(view.store) else min(samples, JOINTS)):
-        stressed = parts.load_stresses([view], samples=joints)
+        stressed = parts.load_stresses(view, joints)
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
         verdicts.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if settings.lines and (joints := _joints_with_lines(view, settings, samples)):
-        loading = load_cycles([view], names=tuple(settings.lines), samples=joints)
+        loading = load_cycles(view, tuple(settings.lines), joints)
         sums = loads.damages(loading)[-1]
         verdicts.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
     return verdicts
@@ -224,7 +215,7 @@ def _joints_with_lines(view: View, settings: Fatigue, again: int) -> int:
     return JOINTS if counting.held(view.store, signals) else min(again, JOINTS)
 
 
-def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> verdict.Verdict:
+def _verdict(about: str, what: str, row: Row, joints: counting.Joints, accepted: float) -> verdict.Verdict:
     """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
     share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
 
@@ -244,7 +235,7 @@ def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -
     return judged._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
-def _of_parts(stressed: Counted, delivery: int) -> list[Part]:
+def _of_parts(stressed: counting.Counted, delivery: int) -> list[Part]:
     rows = parts.part_failures(stressed, delivery)
     panel = Panel(
         "failures-over-life",
@@ -258,7 +249,7 @@ def _of_parts(stressed: Counted, delivery: int) -> list[Part]:
     return [Panels([panel]), table, *map(Sentence, _notes_on_parts(stressed, rows))]
 
 
-def _of_loads(loading: Counted, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
+def _of_loads(loading: counting.Counted, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
     panels = [
         Panel(
             f"spectrum-{channel}",
@@ -277,7 +268,7 @@ def _of_loads(loading: Counted, rows: Rows, seen: Rows, delivery: int) -> list[P
     return [*shown_parts, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
-def _notes_on_parts(stressed: Counted, rows: Rows) -> Iterator[str]:
+def _notes_on_parts(stressed: counting.Counted, rows: Rows) -> Iterator[str]:
     """Number of joints, meaning of the columns, restrictions."""
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
@@ -287,15 +278,15 @@ def _notes_on_parts(stressed: Counted, rows: Rows) -> Iterator[str]:
     life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
     yield f"{life}; intervals count joints without a valid load as failing and as surviving"
     yield from _lines(settings.points)
-    if rows[-1]["point"] == ANY:
-        yield f"{ANY}: the joint fails with its first part; strengths of two points are independent"
+    if rows[-1]["point"] == counting.ANY:
+        yield f"{counting.ANY}: the joint fails with its first part; strengths of two points are independent"
     if not stressed.design.independent:
         yield "no intervals: they hold for independent samples only"
     if stressed.apart > MAX_APART:
         yield _apart(stressed)
 
 
-def _notes_on_loads(loading: Counted, rows: Rows) -> Iterator[str]:
+def _notes_on_loads(loading: counting.Counted, rows: Rows) -> Iterator[str]:
     """Number of joints, definition of the loads, restrictions."""
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
@@ -310,7 +301,7 @@ def _notes_on_loads(loading: Counted, rows: Rows) -> Iterator[str]:
         yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
 
 
-def _apart(counted: Counted) -> str:
+def _apart(counted: counting.Counted) -> str:
     return f"joints simulated again differ from the file by up to {counted.apart:.1g} of a largest load"
 
 
@@ -327,7 +318,7 @@ def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
         yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
-def _draw_failures(ax: Axes, stressed: Counted, life: float) -> None:
+def _draw_failures(ax: Axes, stressed: counting.Counted, life: float) -> None:
     """Draw the share of the joints with a failed part against revolutions, with its band and the service life."""
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
@@ -345,7 +336,7 @@ def _draw_failures(ax: Axes, stressed: Counted, life: float) -> None:
     ax.set(xlabel="revolutions of the input shaft", ylabel="joints with a failed part")
 
 
-def _draw_spectrum(ax: Axes, loading: Counted, channel: str) -> None:
+def _draw_spectrum(ax: Axes, loading: counting.Counted, channel: str) -> None:
     """Draw the spectra of one channel as step curves, with their bands."""
     rows = loads.spectrum(loading, channel)
     ceiling = max(row["estimate"] for row in rows)

@@ -9,14 +9,139 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import cycles
-from tolstat.analysis.cycles import Cycles
+from tolstat.analysis.cycles import Cycles, Transitions
+from tolstat.analysis.design import Design
 from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, LoadHistory, Signal
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import Status
-from tolstat.questions.fatigue.duty import Joints
+from tolstat.display.text import percent
 from tolstat.solver import histories
-from tolstat.store import reader, revolutions
+from tolstat.store import reader, recorded, revolutions
 from tolstat.store.view import View
+from tolstat.study.fatigue import Fatigue, of_text
+
+ANY = "any of them"
+"""Name of the row for all points or channels together."""
+CONFIDENCE = 0.95
+HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints of one campaign or of a duty cycle, and the settings of their evaluation.
+
+    Attributes
+    ----------
+    status : ndarray, shape (n,)
+        `tables.Status`; with several operating points the worst, see `tables.worst_status`.
+    design : Design
+        How the joints were drawn.
+    settings : Fatigue
+        Section ``[fatigue]`` of the study, see `settings_of`.
+    total : int
+        Number of samples of the campaign, those not evaluated included.
+    duty : tuple of (str, float)
+        Operating points and their shares of the revolutions; one entry with share 1 for a single point.
+    """
+
+    status: NDArray[np.uint8]
+    design: Design
+    settings: Fatigue
+    total: int
+    duty: tuple[tuple[str, float], ...]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Which joints settled to a motion that repeats at all operating points, (n,)."""
+        return np.asarray(self.status == Status.OK)
+
+    @property
+    def settled(self) -> str:
+        """Words on the number of these joints."""
+        return f"{int(self.valid.sum())} of {self.status.size} joints settled"
+
+    @property
+    def duty_in_words(self) -> list[str]:
+        """Sentences on the shares of a duty cycle and its sequence; none for a single operating point."""
+        shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
+        if len(self.duty) < 2:
+            return []
+        between = "not counted are cycles between the points: the study gives no [fatigue.sequence]"
+        if self.visits:
+            between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
+            if missed := [name for p, (name, _) in enumerate(self.duty) if p not in self.visits]:
+                between += f"; no visit of {', '.join(missed)}"
+        return [f"over a duty cycle: {shares}, shares of the revolutions", between]
+
+    @property
+    def visits(self) -> list[int]:
+        """Points of `duty` in the order of their visits; empty where the study gives no sequence of several of them."""
+        names = [name for name, _ in self.duty]
+        visited = [names.index(name) for name in self.settings.visits if name in names]
+        return visited if len(set(visited)) > 1 else []
+
+    def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
+        """Cycles that the sequence of operating points closes.
+
+        Parameters
+        ----------
+        low, high : ndarray, shape (n, channels, points)
+            Smallest and largest load at each point of `duty`; NaN for joints without results.
+
+        Returns
+        -------
+        Transitions, optional
+            None without `visits`.
+        """
+        if not self.visits:
+            return None
+        levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
+        tables = histories.between(self.visits, *levels)
+        ranges, means, numbers, replaced = (table.reshape(*low.shape[:2], -1) for table in tables)
+        return Transitions(ranges, means, numbers / self.settings.turns, replaced / self.settings.turns)
+
+
+def joints_of(view: View, samples: int | None) -> Joints:
+    """First samples of a campaign, whose operating points are the duty cycle if it has several; all without a number.
+
+    Raises
+    ------
+    InputError
+        When the shares of the operating points are not known.
+    """
+    several = len(view.parts) > 1
+    shares = view.shares_of_revolutions.tolist() if several else [1.0]
+    return Joints(
+        status=view.status[:samples],
+        design=view.design if samples is None else view.design.only(np.arange(min(samples, view.n))),
+        settings=settings_of(view),
+        total=view.n,
+        duty=tuple(zip(view.points if several else (view.points[0] or view.path.name,), shares, strict=True)),
+    )
+
+
+def settings_of(view: View) -> Fatigue:
+    """Section ``[fatigue]`` of the study of a campaign, with the service life in revolutions over the duty cycle."""
+    bearing = (view.study.joint if view.study_path else recorded.joint_of(view.store, 0)).bearing
+    hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
+    shares = view.shares_of_revolutions if len(view.parts) > 1 else (1.0,)
+    turns = (2.0 * np.pi / abs(part.store.operation.speed) for part in view.parts)
+    turn = sum(share * each for share, each in zip(shares, turns, strict=True))
+    return section(view).within(hours, HOUR / turn, str(view.path))
+
+
+def section(view: View) -> Fatigue:
+    """Section ``[fatigue]`` of the study in a file, or of the one that is read in its place.
+
+    Of the text in the file the section alone is read, like limits: it is at hand even where the study refers to files
+    that are not.
+    """
+    return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
+
+
+def only(values: FloatArray) -> float:
+    """Value of the nominal joint; NaN if there is none."""
+    return float(values[0]) if values.size else np.nan
 
 
 @dataclass(frozen=True)
@@ -39,8 +164,7 @@ class Counted(Joints):
 
 
 def count(
-    views: Sequence[View],
-    shares: Sequence[float],
+    view: View,
     joints: Joints,
     signals: Sequence[Signal],
     chosen: NDArray[np.bool_],
@@ -50,10 +174,10 @@ def count(
 
     Parameters
     ----------
-    views, shares : sequence of View, sequence of float
-        The `duty.members`.
+    view : View
+        The campaign.
     joints : Joints
-        Their first n samples.
+        Its first n samples.
     signals : sequence of Signal
         What cycles are counted of. Where a file does not hold it, the joints are simulated again.
     chosen : ndarray of bool, shape (n,)
@@ -61,16 +185,16 @@ def count(
     kept : int
         Maximum number of cycles of a signal at an operating point, the largest ones.
     """
-    both = int(all((view.nominal["status"] == Status.OK).any() for view in views))
+    both = int(all((part.nominal["status"] == Status.OK).any() for part in view.parts))
     rows = np.append(np.zeros(both, np.intp), 1 + np.flatnonzero(chosen))
     parts, apart = list[Cycles](), 0.0
-    for view in views:
-        slots = np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1))
-        part, difference = of_slots(view.store, slots, signals, kept)
+    for at in view.parts:
+        slots = np.append(at.nominal_slots[:both], at.slots(rows[both:] - 1))
+        part, difference = of_slots(at.store, slots, signals, kept)
         parts.append(part.spread(rows, 1 + joints.status.size))
         apart = max(apart, difference)
     low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
-    whole = cycles.duty_cycle(parts, shares, joints.transitions(low, high))
+    whole = cycles.duty_cycle(parts, [share for _, share in joints.duty], joints.transitions(low, high))
     whole = whole.with_starts(joints.settings.starts / joints.settings.revolutions)
     return Counted(**vars(joints), cycles=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 

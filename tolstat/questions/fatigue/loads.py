@@ -8,7 +8,6 @@ from dataclasses import asdict
 import numpy as np
 
 from tolstat.analysis import cycles, prediction
-from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
 from tolstat.common import load_kinds, loads
 from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, signals_of, unit_of
@@ -16,9 +15,8 @@ from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.late import pandas as pd
 from tolstat.common.tables import SIMULATED
 from tolstat.display.table import Row, Rows
-from tolstat.questions.fatigue import counting, duty
-from tolstat.questions.fatigue.counting import Counted
-from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, only
+from tolstat.questions.fatigue import counting
+from tolstat.questions.fatigue.counting import ANY, CONFIDENCE, Counted, only
 from tolstat.store.view import View
 from tolstat.study.fatigue import counted_names
 from tolstat.study.selection import Entry
@@ -47,22 +45,13 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: order.index(name) if name in COMPONENTS else len(order)))
 
 
-def load_cycles(
-    views: Sequence[View],
-    shares: Sequence[float] | None = None,
-    names: Sequence[str] | None = None,
-    samples: int | None = None,
-) -> Counted:
-    """Rainflow cycles of a campaign, or of the same joints at the several operating points of a duty cycle.
+def load_cycles(view: View, names: Sequence[str] | None = None, samples: int | None = None) -> Counted:
+    """Rainflow cycles of a campaign, over the duty cycle of its operating points if it has several.
 
     Parameters
     ----------
-    views : sequence of View
-        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
-        each operating point.
-    shares : sequence of float, optional
-        Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
-        campaign follow from their shares of the time and their speeds, see `View.shares_of_revolutions`.
+    view : View
+        The campaign; shares of the revolutions follow from those of the time, see `View.shares_of_revolutions`.
     names : sequence of str, optional
         Components and directions, see `channels.signals_of`; by default components of bushings and what has an S–N
         line, some 6 kB per joint. Cycles of a joint that has not settled are those of its last revolution.
@@ -72,15 +61,14 @@ def load_cycles(
     Raises
     ------
     InputError
-        When the shares are not shares or not known, or the campaigns have different joints.
+        When the shares of the operating points are not known.
     """
-    views, shares = duty.members(views, shares)
-    joints = duty.joints_of(views, shares, samples)
+    joints = counting.joints_of(view, samples)
     if names is None:
         names = tuple(dict.fromkeys((*SHOWN, *joints.settings.lines)))
     signals = [signal for name in names for signal in signals_of(name)]
-    simulated = np.all([np.isin(view.status[:samples], SIMULATED) for view in views], axis=0)
-    return counting.count(views, shares, joints, signals, simulated)
+    simulated = np.all([np.isin(part.status[:samples], SIMULATED) for part in view.parts], axis=0)
+    return counting.count(view, joints, signals, simulated)
 
 
 def equivalent_loads(loading: Counted) -> Rows:
@@ -233,7 +221,7 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     InputError
         When the shares of the operating points are not known.
     """
-    loading = load_cycles([view], names=names)
+    loading = load_cycles(view, names)
     parts = [(loading.cycles, view.rows(np.arange(view.n)))]
     if nominal:
         parts.insert(0, (loading.nominal, view.store.row(view.nominal_slots)))
@@ -241,7 +229,7 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     return pd.concat(frames, ignore_index=True)
 
 
-def _frame(part: Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> pd.DataFrame:
+def _frame(part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> pd.DataFrame:
     joint, channel, cycle = np.nonzero((part.ranges > 0) & (part.repeats > 0))  # leaves out NaN
     units = [unit_of(name) for name in part.channels]
     return pd.DataFrame(

@@ -16,8 +16,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
-from tolstat.questions.fatigue import counting, duty
-from tolstat.questions.fatigue.counting import Counted
+from tolstat.questions.fatigue import counting
+from tolstat.questions.fatigue.counting import ANY, CONFIDENCE, Counted, only
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, StressPoint
 
@@ -27,19 +27,16 @@ LONGEST = 1e12
 """Lives beyond so many service lives are given as infinite."""
 
 
-def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Counted:
-    """Stress cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+def load_stresses(view: View, samples: int | None = None) -> Counted:
+    """Stress cycles of a campaign, over the duty cycle of its operating points if it has several.
 
     The stress of each point is formed from the load components at each input angle before cycles are counted. Where a
     file holds no load histories, its joints are simulated again.
 
     Parameters
     ----------
-    views : sequence of View
-        One campaign, or the same joints in several, see `duty.members`. The study of the first has
-        ``[fatigue.point]``.
-    shares : sequence of float, optional
-        Share of the revolutions in each of several campaigns; the sum is 1.
+    view : View
+        The campaign; its study has ``[fatigue.point]``.
     samples : int, optional
         Number of samples, from the first; by default all.
 
@@ -51,16 +48,15 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     Raises
     ------
     InputError
-        When the study has no points, the shares are not shares, or the campaigns have different joints.
+        When the study has no points, or the shares of its operating points are not known.
     """
-    views, shares = duty.members(views, shares)
-    joints = duty.joints_of(views, shares, samples)
+    joints = counting.joints_of(view, samples)
     points = joints.settings.points
     if not points:
         remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
-        raise InputError([Fault(str(views[0].path), "its study names no point of a part", remedy)])
-    every = 1 + max(int(view.store.options["steps_per_rev"]) for view in views) // 2
-    return counting.count(views, shares, joints, stresses_at(points), joints.valid, every)
+        raise InputError([Fault(str(view.path), "its study names no point of a part", remedy)])
+    every = 1 + max(int(part.store.options["steps_per_rev"]) for part in view.parts) // 2
+    return counting.count(view, joints, stresses_at(points), joints.valid, every)
 
 
 def stresses_at(points: Sequence[StressPoint]) -> list[Signal]:
@@ -101,15 +97,15 @@ def part_failures(stressed: Counted, delivery: int = prediction.DELIVERY) -> Row
     heads = [_damage(stressed, p, points[p], nominal[p]) for p in range(len(points))]
     groups = [slice(p, p + 1) for p in range(len(points))]
     if len(points) > 1:
-        heads.append({"point": duty.ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
+        heads.append({"point": ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
         groups.append(slice(None))
     rows = []
     for head, group in zip(heads, groups, strict=True):
-        wide = failures(stressed, points[group], confidence=prediction.half(duty.CONFIDENCE))
-        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, duty.CONFIDENCE)
+        wide = failures(stressed, points[group], confidence=prediction.half(CONFIDENCE))
+        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, CONFIDENCE)
         head |= prediction.columns(following, delivery) | _life(stressed, points[group])
-        head |= {"nominal_failures": duty.only(_chances(nominal[group]))} | failures(stressed, points[group])._asdict()
-        rows.append(head | {"confidence": duty.CONFIDENCE})
+        head |= {"nominal_failures": only(_chances(nominal[group]))} | failures(stressed, points[group])._asdict()
+        rows.append(head | {"confidence": CONFIDENCE})
     return rows
 
 
@@ -120,7 +116,7 @@ def failures_over_life(stressed: Counted, revolutions: Sequence[float]) -> list[
 
 
 def failures(
-    stressed: Counted, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = duty.CONFIDENCE
+    stressed: Counted, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = CONFIDENCE
 ) -> strength.Failures:
     """Share of the joints of which a part has failed at any of some points after so many service lives.
 
@@ -167,7 +163,7 @@ def _damage(stressed: Counted, p: int, joints: Evaluated, nominal: Evaluated) ->
     point = stressed.settings.points[p]
     sample = Sample.of(strength.damage_at(*joints), stressed.status, stressed.design)
     head = {"point": point.name, "bushing": point.bushing, **point.line._asdict()}
-    head["nominal"] = duty.only(strength.damage_at(*nominal))
+    head["nominal"] = only(strength.damage_at(*nominal))
     return head | {name: sample.quantile(share).estimate for name, share in (("median", 0.5), ("upper_99", 0.99))}
 
 

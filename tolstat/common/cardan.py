@@ -71,8 +71,10 @@ def series(number: int) -> Mechanism:
         joints.append(joint("", f"joint{i}.", *ends))
     parts = ("members", "lumps", "shafts", "bushings", "hinges", "pairs", "unknowns", "cardan")
     together = {part: sum((getattr(one, part) for one in joints), ()) for part in parts}
-    return Mechanism(f"{number} joints in series", **together)
+    return Mechanism("series", **together)
 
 
 SERIES = series(2)
 """Two joints in series."""
+MECHANISMS = {mechanism.name: mechanism for mechanism in (CARDAN, SERIES)}
+"""Mechanisms by name."""

@@ -8,15 +8,17 @@ methods that need it have a table of how each joint was drawn, which the result 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.fields import Field, dtype_of
-from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, RESULT_FIELDS
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import Load
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import DESIGN_FIELDS, LEDGER_FIELDS, tables
 
 
 class Column(NamedTuple):
@@ -50,34 +52,46 @@ def flat(fields: tuple[Field, ...]) -> tuple[Column, ...]:
 
 DESIGN_COLUMNS = flat(DESIGN_FIELDS)
 LEDGER_COLUMNS = flat(LEDGER_FIELDS)
-ERROR_COLUMNS = flat(ERROR_FIELDS)
-RESULT_COLUMNS = flat(RESULT_FIELDS)
 KEPT = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
-OPTIONAL_FIELDS = (
-    "mode_share",
-    "equivalent_load",
-    "clearance",
-    *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()),
-)
-"""Fields of the results that a study may leave out."""
-RESULT_NAMES = tuple(c.name for c in RESULT_COLUMNS)
 
 
-def kept_names(names: Iterable[str]) -> list[str] | None:
+@cache
+def error_columns(mechanism: Mechanism) -> tuple[Column, ...]:
+    """Columns of the errors."""
+    return flat(tables(mechanism).error_fields)
+
+
+@cache
+def result_columns(mechanism: Mechanism) -> tuple[Column, ...]:
+    """Columns of the results."""
+    return flat(tables(mechanism).result_fields)
+
+
+@cache
+def optional_columns(mechanism: Mechanism) -> tuple[Column, ...]:
+    """Columns of the results that a study may leave out."""
+    of_loads = {field.name for kind in kinds(mechanism).values() for field in kind.statistics().values()}
+    optional = {"mode_share", "equivalent_load", "clearance"} | of_loads
+    return tuple(column for column in result_columns(mechanism) if column.field in optional)
+
+
+def kept_names(names: Iterable[str], mechanism: Mechanism) -> list[str] | None:
     """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
-    optional = [c.name for c in RESULT_COLUMNS if c.field in OPTIONAL_FIELDS]
+    optional = [c.name for c in optional_columns(mechanism)]
     among = [name for name in optional if name in set(names)]
     return None if among == optional else among
 
 
-def kept_columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
+def kept_columns(identity: Mapping[str, Any], mechanism: Mechanism) -> tuple[Column, ...]:
     """Columns of the results that a campaign keeps, in the order of the table.
 
     Parameters
     ----------
     identity : mapping
         Identity of the campaign's study, by dotted key.
+    mechanism : Mechanism
+        What is simulated.
 
     Raises
     ------
@@ -85,24 +99,25 @@ def kept_columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
         When the identity holds anything but a list of column names.
     """
     names = identity.get(KEPT)
+    columns, optional = result_columns(mechanism), optional_columns(mechanism)
     if names is None:
-        return RESULT_COLUMNS
-    if not isinstance(names, list) or any(name not in RESULT_NAMES for name in names):
+        return columns
+    if not isinstance(names, list) or any(name not in {c.name for c in columns} for name in names):
         raise ValueError(f"{KEPT} is {names!r}, not a list of columns of the results")
-    return tuple(c for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS or c.name in names)
+    return tuple(c for c in columns if c not in optional or c.name in names)
 
 
-def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
+def blank_others(results: NDArray[np.void], kept: Iterable[Column], mechanism: Mechanism) -> None:
     """Write NaN to the columns of a table RESULT that are not in `kept`; all of these have type f8."""
     names = {c.name for c in kept}
-    for c in RESULT_COLUMNS:
+    for c in result_columns(mechanism):
         if c.name not in names:
             c.of(results)[:] = np.nan
 
 
-def holds(kept: Iterable[Column], load: str) -> bool:
+def holds(kept: Iterable[Column], load: Load) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
-    return {c.name for c in kept}.issuperset(LOADS[load].columns)
+    return {c.name for c in kept}.issuperset(load.columns)
 
 
 SUBSET_FIELDS = (

@@ -1,18 +1,20 @@
-"""The loads of a joint: name, where its values are, place, kind.
+"""The loads of a mechanism: name, where its values are, place, kind.
 
-They follow from the registry `load_kinds.LOAD_KINDS`: each place of a kind has one load, or one for each order. Limits,
-reports, checks of the numerical error, selection of results and export read them.
+They follow from `load_kinds.kinds`: each place of a kind has one load, or one for each order. Limits, reports, checks
+of the numerical error, selection of results and export read them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import LOAD_KINDS, PLACES, SPAN, Kind, Place
+from tolstat.common.load_kinds import Kind, Place, kinds, places, spans
+from tolstat.common.mechanism import Mechanism
 
 FloatArray = NDArray[np.float64]
 Results = NDArray[np.void] | Mapping[str, NDArray[Any]]
@@ -66,9 +68,41 @@ def split(name: str) -> tuple[str, str]:
     return load, points
 
 
-def load_of(name: str) -> Load:
+@cache
+def loads_of(mechanism: Mechanism) -> dict[str, Load]:
+    """Every load of a mechanism by name, by place in the order in which the kinds first name the places."""
+    found = []
+    for kind in kinds(mechanism).values():
+        columns, parts = kind.columns("max"), len(kind.parts or ("",))
+        for i, (place, name) in enumerate(kind.loads()):
+            found.append(Load(name, kind, places(mechanism)[place], i, columns[i * parts : (i + 1) * parts]))
+    first = [load.place.name for load in found]
+    groups = [kind.places for kind in kinds(mechanism).values()]
+    found.sort(key=lambda load: (groups.index(load.kind.places), first.index(load.place.name)))
+    return {load.name: load for load in found}
+
+
+def load_of(name: str, mechanism: Mechanism) -> Load:
     """Load that a name is about, whatever operating points it names."""
-    return LOADS[split(name)[0]]
+    return loads_of(mechanism)[split(name)[0]]
+
+
+@cache
+def shown_loads(mechanism: Mechanism) -> tuple[str, ...]:
+    """Loads that every report shows if the study keeps them: force and bending moment of each bushing."""
+    return tuple(load.name for load in loads_of(mechanism).values() if load.kind.shown)
+
+
+@cache
+def units_of_loads(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of each load."""
+    return {load.name: load.unit for load in loads_of(mechanism).values()}
+
+
+@cache
+def units_of_limits(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of each load that can have a limit: all but the amplitudes of Psi by order."""
+    return {load.name: load.unit for load in loads_of(mechanism).values() if load.kind.key != "psi_orders"}
 
 
 class Limit(NamedTuple):
@@ -82,11 +116,14 @@ class Limit(NamedTuple):
         Names of the loads; a joint is above the limit if any of them is above its level.
     levels : tuple of float
         Level of each load, SI.
+    mechanism : Mechanism
+        Whose loads they are.
     """
 
     name: str
     loads: tuple[str, ...]
     levels: tuple[float, ...]
+    mechanism: Mechanism
 
     @property
     def has_one_level(self) -> bool:
@@ -101,7 +138,7 @@ class Limit(NamedTuple):
     @property
     def unit(self) -> str:
         """SI unit of `level`."""
-        return load_of(self.loads[0]).unit if self.has_one_level else "1"
+        return load_of(self.loads[0], self.mechanism).unit if self.has_one_level else "1"
 
     def __str__(self) -> str:
         """``cross*.F > 700 N``, or `ANY_LIMIT`."""
@@ -109,7 +146,7 @@ class Limit(NamedTuple):
 
     def of(self, results: NDArray[np.void]) -> FloatArray:
         """Largest of the loads in each joint, (n,), to be compared with `level`; NaN if any of them is."""
-        parts = [load_of(name).of(results) for name in self.loads]
+        parts = [load_of(name, self.mechanism).of(results) for name in self.loads]
         if not self.has_one_level:
             parts = [part / level for part, level in zip(parts, self.levels, strict=True)]
         return np.asarray(np.maximum.reduce(parts))
@@ -123,34 +160,31 @@ def of_kind(results: Results, kind: Kind) -> FloatArray:
     return values.reshape(len(values), len(kind.loads()))
 
 
-def largest(results: NDArray[np.void]) -> FloatArray:
-    """Largest values of all kinds, (n, values), SI, in the order of `load_kinds.SPAN`."""
-    return np.concatenate([results[f"{key}_max"].reshape(len(results), -1) for key in SPAN], axis=1)
+def largest(results: NDArray[np.void], mechanism: Mechanism) -> FloatArray:
+    """Largest values of all kinds, (n, values), SI, in the order of `load_kinds.spans`."""
+    return np.concatenate([results[f"{key}_max"].reshape(len(results), -1) for key in kinds(mechanism)], axis=1)
 
 
-def put_largest(values: FloatArray | float, results: NDArray[np.void]) -> None:
+def put_largest(values: FloatArray | float, results: NDArray[np.void], mechanism: Mechanism) -> None:
     """Write largest values, ordered as `largest` returns them, or one value for all, to a table RESULT."""
-    values = np.broadcast_to(values, (len(results), max(span.stop for span in SPAN.values())))
-    for key, span in SPAN.items():
+    values = np.broadcast_to(values, (len(results), max(span.stop for span in spans(mechanism).values())))
+    for key, span in spans(mechanism).items():
         field = results[f"{key}_max"]
         field[...] = values[:, span].reshape(field.shape)
 
 
-def _entries() -> list[Load]:
-    """Loads by place, in the order in which the registry of kinds first names the places."""
-    loads = []
-    for kind in LOAD_KINDS:
-        columns, parts = kind.columns("max"), len(kind.parts or ("",))
-        for i, (place, name) in enumerate(kind.loads()):
-            loads.append(Load(name, kind, PLACES[place], i, columns[i * parts : (i + 1) * parts]))
-    first = [load.place.name for load in loads]
-    groups = [kind.places for kind in LOAD_KINDS]
-    return sorted(loads, key=lambda load: (groups.index(load.kind.places), first.index(load.place.name)))
-
-
-def names_of(group: str, kind: Kind) -> tuple[str, ...]:
+def names_of(group: str, kind: Kind, mechanism: Mechanism) -> tuple[str, ...]:
     """Names of the loads of a kind at the places of a group, ``"cross"``."""
-    return tuple(name for name, load in LOADS.items() if load.kind == kind and load.place.group == group)
+    found = loads_of(mechanism).items()
+    return tuple(name for name, load in found if load.kind == kind and load.place.group == group)
+
+
+@cache
+def panels(mechanism: Mechanism) -> tuple[tuple[str, Kind], ...]:
+    """Groups of bushings and kinds of loads; figures of a whole campaign have a panel for each."""
+    shown = [kind for kind in kinds(mechanism).values() if kind.shown]
+    groups = dict.fromkeys(bushing.group for bushing in mechanism.bushings)
+    return tuple((group, kind) for group in groups for kind in shown)
 
 
 def unit_text(unit: str) -> str:
@@ -158,27 +192,21 @@ def unit_text(unit: str) -> str:
     return {"N*m": "N m", "1": ""}.get(unit, unit)
 
 
-def limits_in_words(limits: Mapping[str, float]) -> str:
+def limits_in_words(limits: Mapping[str, float], mechanism: Mechanism) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        loads.setdefault(f"{limit:g} {unit_text(load_of(name).unit)}".rstrip(), []).append(name)
+        loads.setdefault(f"{limit:g} {unit_text(load_of(name, mechanism).unit)}".rstrip(), []).append(name)
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 
-LOADS = {load.name: load for load in _entries()}
-"""Every load, by name."""
-UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
-"""SI unit of each load."""
-UNIT_OF_LIMIT = {load.name: load.unit for load in LOADS.values() if load.kind.key != "psi_orders"}
-"""SI unit of each load that can have a limit: all but the amplitudes of Psi by order."""
-SHOWN_LOADS = tuple(load.name for load in LOADS.values() if load.kind.shown)
-"""Loads that every report shows if the study keeps them: force and bending moment of each bushing."""
-PANELS = tuple((group, kind) for group in ("cross", "fork") for kind in LOAD_KINDS if kind.shown)
-"""Groups of bushings and kinds of loads; figures of a whole campaign have a panel for each."""
 QUANTITY = {"N": "force", "N*m": "bending moment at the root"}
 """What the loads of a bushing are called, by unit; the root is that of the pin or arm."""
 ANY_LIMIT = "any limit"
 """Name of all limits of a study together: a joint is above it if it is above at least one of them."""
-LOAD_FIELDS = ("status", *(f"{key}_{of}" for key in SPAN for of in ("max", "lower", "upper")))
-"""Fields of the results that loads and their intervals are read from, and the status."""
+
+
+@cache
+def load_fields(mechanism: Mechanism) -> tuple[str, ...]:
+    """Fields of the results that loads and their intervals are read from, and the status."""
+    return ("status", *(f"{key}_{of}" for key in kinds(mechanism) for of in ("max", "lower", "upper")))

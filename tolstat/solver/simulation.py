@@ -39,7 +39,7 @@ UNIFORM_REVS = 4
 
 
 @cache
-def lanes(options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
+def lanes(options: Options, width: int, mechanism: Mechanism) -> Batch:
     """Work arrays of this process for `width` joints at a time; importing the kernel here spares light commands."""
     from tolstat.kernel.lanes.batch import make_batch
 
@@ -65,9 +65,9 @@ def width_for(joints: int) -> int:
 def simulate_rows(
     params: NDArray[np.void],
     options: Options,
+    mechanism: Mechanism,
     histories: Histories = "none",
     n_harmonics: int = 16,
-    mechanism: Mechanism = CARDAN,
 ) -> Simulation:
     """Simulate joints; row i of the result is joint i, and depends on no other row.
 
@@ -77,12 +77,12 @@ def simulate_rows(
         The joints.
     options : Options
         Numerical settings.
+    mechanism : Mechanism
+        What the joints are.
     histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
         Load histories to keep, see `history_specs`.
     n_harmonics : int
         Highest harmonic kept.
-    mechanism : Mechanism
-        What the joints are.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def simulate_rows(
     """
     if options.fidelity == Fidelity.IDEAL:
         ideal.check(params)
-    specs = history_specs(options, histories, n_harmonics)
+    specs = history_specs(options, histories, n_harmonics, mechanism)
     recorded = {name: spec.blank(len(params)) for name, spec in specs.items()}
     allowed = tables.iterations_allowed(options.steps_per_rev, options.max_revs)
     left = np.full(len(params), allowed)
@@ -106,11 +106,11 @@ def simulate_rows(
         blocks = blank_results((len(rows), settings.max_revs) if follows else (0, 0), mechanism)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
         run = simulate_together(
-            params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows, mechanism=mechanism
+            params[rows], settings, still_allowed, bool(specs), out, mechanism, blocks, of_rows
         )
         for i, samples in run:
             if out[i].status in SIMULATED:
-                for name, values in extracted(samples, histories, specs).items():
+                for name, values in extracted(samples, histories, specs, mechanism).items():
                     recorded[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
@@ -123,9 +123,9 @@ def simulate_rows(
     others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
     if len(others):
         results[others], _ = simulate(others, options)
-    refinement.refine(results, options, simulate)
+    refinement.refine(results, options, mechanism, simulate)
     results["newton_iterations"][(results["status"] == Status.NEWTON_FAILED) & (left <= 0)] = allowed
-    stationary.fill_intervals(results)
+    stationary.fill_intervals(results, mechanism)
     results["clearance"] = params["clearance"]
     return Simulation(results, recorded)
 
@@ -136,9 +136,9 @@ def simulate_together(
     left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
+    mechanism: Mechanism,
     blocks: NDArray[np.void] | None = None,
     steps: NDArray[np.int64] | None = None,
-    mechanism: Mechanism = CARDAN,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
@@ -198,7 +198,7 @@ def make_queue(
     return Queue(rows, words, found, left, samples, blocks, tables.for_kernels(out, mechanism))
 
 
-def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
+def run_lanes(queue: Queue, options: Options, mechanism: Mechanism) -> NDArray[np.int64]:
     """Simulate the joints of a queue in lock-step; return the counts of `kernel.lanes.lockstep.lockstep`."""
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep, one_at_a_time
 
@@ -211,7 +211,7 @@ def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> 
     return tally
 
 
-def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
+def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width, mechanism)
     for name in ("n_stations", "n_orders", *numbers(mechanism)):
@@ -219,7 +219,7 @@ def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism =
     return batch
 
 
-def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
+def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.float64]:
     """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (dof,)."""
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
@@ -239,7 +239,7 @@ def _ideal(
     """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`."""
     from tolstat.kernel.revolution.ideal import ideal_revolution
 
-    batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results, CARDAN)
+    batch, rows, out = lanes(options, 1, CARDAN), params.view(np.recarray), tables.for_kernels(results, CARDAN)
     at_rest = np.zeros(CARDAN.dof)
     for i in range(len(params)):
         ideal_revolution(rows[i], options, at_rest, batch.scratch, batch.samples[0], batch.notes[0], out[i])
@@ -247,7 +247,7 @@ def _ideal(
             yield i, batch.samples[0]
 
 
-def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
+def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.float64]:
     """Where the search for the start of each joint begins, (n, dof), see `kernel.revolution.starts`.
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
@@ -260,7 +260,7 @@ def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism = CARD
     return out
 
 
-def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
+def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.int64]:
     """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
 
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where

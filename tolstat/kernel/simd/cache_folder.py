@@ -17,8 +17,8 @@ from importlib import metadata
 from pathlib import Path
 
 KERNEL = Path(__file__).parent.parent
-TABLES = ("fields.py", "load_kinds.py", "tables.py")
-"""Files of ``common/`` that the layout of the tables follows from."""
+TABLES = ("load_kinds.py", "mechanism.py", "parameters.py", "tables.py")
+"""Files of ``common/`` whose constants are part of compiled code; sizes of records are part of its signature."""
 PREFIX, SUFFIX = "kernel-", ".nbc"
 """How names of folders begin, and how those of files with compiled code end."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -288,7 +287,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:
-    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    differing = differing_keys(store.identity, study.identity())
     found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"

@@ -185,19 +185,10 @@ def _rounded(number: re.Match[str]) -> str:
 
 def _parsed(setting: str, place: str) -> tuple[list[str], Any]:
     """Parts of the key of a setting, without ``tolerances``, and its value."""
-    name, equals, value = setting.partition("=")
-    path = [part.strip() for part in name.split(".")]
-    if not (equals and value.strip() and all(path)) or (len(path) < NAMES and path[0] not in SECTIONS):
-        raise input_error(place, "is not a setting", EXAMPLE)
-    if path[0] == "tolerances":
-        path = path[1:]
-    elif path[0] in SECTIONS and path[0] not in SETTABLE:
+    path, value = rewriting.parsed(setting, place, EXAMPLE)
+    if path[0] in SECTIONS and path[0] not in (*SETTABLE, "tolerances"):
         raise input_error(place, f"is in section {path[0]!r}, which changes no joint", OTHERS)
-    elif len(path) < NAMES:
-        raise input_error(place, "is not a setting", EXAMPLE)
-    if not path:
-        raise input_error(place, "is not a setting", EXAMPLE)
-    return path, rewriting.given(value)
+    return path[1:] if path[0] == "tolerances" else path, value
 
 
 def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -325,4 +326,5 @@ class Study(Case):
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],
         }
         parts |= {name: part for name, part in optional.items() if part}
-        return leaves(parts | (self.listed.identity() if self.listed else {}))
+        identity: dict[str, Any] = leaves(parts | (self.listed.identity() if self.listed else {}))
+        return dict(json.loads(json.dumps(identity)))

@@ -23,7 +23,7 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
-from tolstat.study import Case
+from tolstat.study import Study
 
 
 class CaseResult(NamedTuple):
@@ -126,12 +126,12 @@ def _components(history: LoadHistory, histories: Mapping[str, NDArray[Any]]) -> 
     }
 
 
-def simulate_case(case: Case) -> CaseResult:
+def simulate_case(case: Study) -> CaseResult:
     """Simulate the joint of a case file, and the same joint without errors.
 
     Parameters
     ----------
-    case : Case
+    case : Study
         As `study.load_case` reads it.
 
     Returns

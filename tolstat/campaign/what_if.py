@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.campaign import pool
-from tolstat.campaign.block import Block, Timed, results_of
+from tolstat.campaign.block import Block, Timed, loads_of, results_of
 from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import VALID, Options, Status, worst_status
+from tolstat.common.tables import Options, Status, worst_status
 from tolstat.joint import perturb
 from tolstat.store import Reader, Writer, what_if
 from tolstat.store.hdf5 import store_error
@@ -192,7 +191,7 @@ def simulate(
     table = _Table(todo, asked, names)
     blocks = _blocks(options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), blocks, workers, stop)
-    counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
+    counts, saved = Counts(table.status.size), time.monotonic()
     progress(counts)
     try:
         with closing(done):
@@ -227,9 +226,7 @@ class _Table:
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
         index = block.slots, self.asked.points.index(block.point)
-        loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
-        self.loads[index] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
-        self.status[index] = results["status"]
+        self.loads[index], self.status[index] = loads_of(results, self.asked.loads), results["status"]
         return np.asarray(self.status[index])
 
     def sets(self, in_file: Mapping[str, Altered]) -> dict[str, Altered]:

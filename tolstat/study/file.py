@@ -24,8 +24,8 @@ from tolstat.joint.reading import faults_of_assumed
 from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
-from tolstat.study.selection import TOLERANCED, Assignments, Reading
 from tolstat.study.points import Point
+from tolstat.study.selection import TOLERANCED, Assignments, Reading
 from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances

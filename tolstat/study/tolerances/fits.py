@@ -113,9 +113,8 @@ class Fit(NamedTuple):
     def diameters(self) -> dict[str, str]:
         """Nominal diameters, as keys of ``joint.contact``."""
         middles = (zone.middle for zone in self.entry.zones)
-        return {
-            key: _written(1e6 * self.entry.basic + middle) for key, middle in zip(("D_H", "D_P"), middles, strict=True)
-        }
+        sizes = (_written(1e6 * self.entry.basic + middle) for middle in middles)
+        return dict(zip(("D_H", "D_P"), sizes, strict=True))
 
     @property
     def meaning(self) -> list[str]:

@@ -107,10 +107,8 @@ class Interrupted(Exception):
         self.path = path
         self.counts = counts
         self.exit_code = 128 + number
-        super().__init__(
-            f"stopped: {path} holds the results of {counts.done} of {counts.total} joints\n"
-            "  hint: to resume, run the same command again"
-        )
+        held = f"{path} holds the results of {counts.done} of {counts.total} joints"
+        super().__init__(f"stopped: {held}\n  hint: to resume, run the same command again")
 
 
 def run(

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial
-from tolstat.analysis.sample import CONFIDENCE
 from tolstat.campaign.pool import kept_workers
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
@@ -28,6 +27,7 @@ from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
 from tolstat.study.selection import Entry, quantity, resolve
 
+CONFIDENCE = 0.95
 BIASED = f"biased high if few joints are above ({100 * binomial.BIAS:.0f} % of itself with {binomial.LEAST_BESIDE})"
 """Sentence on the share at a stop."""
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'

@@ -267,9 +267,8 @@ class Quantity:
             si = isinstance(value, float) and bool(info.context and info.context.get("si"))
             return to_si(value, "1" if si else self.unit, self.mark)
 
-        return core_schema.with_info_plain_validator_function(
-            read, serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
-        )
+        writing = core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
+        return core_schema.with_info_plain_validator_function(read, serialization=writing)
 
     def _word(self, value: str) -> str:
         if value in self.words:

@@ -241,9 +241,7 @@ def _fast_points(study: Study) -> Iterator[Fault]:
         product = abs(rpm) * alpha
         if product > FAST * (1.0 + ROUNDING):
             at = f" at {point.name}" if point.name else ""
-            found = (
-                f"{rpm:.4g} rpm at {alpha:.3g} deg{at}: speed times angle, {product:.0f} rpm deg, is beyond the "
-                f"{FAST:g} that makers of joint shafts allow"
-            )
+            found = f"{rpm:.4g} rpm at {alpha:.3g} deg{at}: speed times angle, {product:.0f} rpm deg, is beyond the "
+            found += f"{FAST:g} that makers of joint shafts allow"
             key = f"operation[{number}].speed" if point.name else "operation.speed"
             yield study.fault(key, found, "check it and alpha, and their units")

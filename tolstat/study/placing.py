@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import reduce
 from operator import getitem
 from pathlib import Path
@@ -70,10 +70,10 @@ def _between(path: Path, folder: Path) -> str:
         return path.absolute().as_posix()
 
 
-def _files(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+def _files(data: Any) -> Iterator[tuple[KeyPath, str]]:
     """Key path and name of each file that a study names: of joints, measured parts and measured signals."""
     for path in paths(data):
-        value: Any = reduce(getitem, path, data)
+        value = reduce(getitem, path, data)
         if not isinstance(value, str):
             continue
         is_path = value.endswith(".toml") or len(Path(value).parts) > 1

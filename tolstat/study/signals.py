@@ -303,10 +303,10 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
     return text, tuple(notes)
 
 
-def _files(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Table]]:
+def _files(data: Any) -> Iterator[tuple[KeyPath, Table]]:
     """Key path and table of each speed or torque that is a file."""
     for path in paths({"operation": data.get("operation")}):
-        table: Any = reduce(getitem, path, data)
+        table = reduce(getitem, path, data)
         is_of_point = path[-1] in WRITTEN and all(isinstance(part, int) for part in path[1:-1])
         if is_of_point and isinstance(table, dict) and "file" in table:
             yield path, table

@@ -183,11 +183,9 @@ def of(data: object, place: str) -> Fit:
 
 
 def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fault:
-    article = "an" if zones.kind == "interference" else "a"
-    found = (
-        f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
-        f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
-    )
+    kind = f"{'an' if zones.kind == 'interference' else 'a'} {zones.kind} fit"
+    found = f"{entry.code} is {kind}, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
+    found += f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
 
 

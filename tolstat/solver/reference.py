@@ -103,7 +103,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
     if from_start:
-        t0, y0 = 0.0, _start(params, options)
+        is_ramp = options.start == Start.RAMP
+        t0, y0 = 0.0, np.concatenate([AT_REST if is_ramp else equilibrium(params, options), AT_REST])
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
@@ -133,13 +134,6 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
-
-
-def _start(params: NDArray[np.void], options: Options) -> FloatArray:
-    """Initial state of the solver at time zero, (112,)."""
-    if options.start == Start.RAMP:
-        return np.zeros(2 * len(AT_REST))
-    return np.concatenate([equilibrium(params, options), AT_REST])
 
 
 def reference_rows(

@@ -53,7 +53,8 @@ def test_no_joint_above_has_no_wider_interval_than_some():
 def test_interval_covers_where_lots_are_nearly_all_good_or_all_bad():
     rng = np.random.default_rng(8)
     above = np.stack([of_beta(0.04, 0.8, 40, 20, rng) for _ in range(400)], axis=1)
-    assert np.mean(clustered.interval(above, np.full(40, 20)).upper < 0.04) < 0.02  # 0.06 if lots without a bad joint had the end of the beta law
+    # 0.06 if lots without a bad joint had the end of the beta law
+    assert np.mean(clustered.interval(above, np.full(40, 20)).upper < 0.04) < 0.02
 
 
 def test_interval_covers_where_few_lots_have_the_bad_joints():

@@ -161,7 +161,7 @@ def test_a_value_that_the_joint_has_is_not_varied(tmp_path):
     free = TEXT.replace(GIVEN, f'{GIVEN}shaft.axial = "free"\n')
     both, alone = loaded(tmp_path, free.replace('[{ shaft.axial = "free" }]', other)), made(tmp_path, free)
     assert [one.label for one in variations.singles(both) if one.name == "mounting"] == ["shaft rigid"]
-    assert simulated(alone).endswith("600 joints of each of 4 variations")
+    assert simulated(alone).endswith("600 of each of 3 variations")
     found = standing(alone)
     assert "mounting" not in {*found.still, *found.missing, *found.names}
     assert found.confidence == 1.0 - 0.05 / len(found.rows)

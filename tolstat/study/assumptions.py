@@ -124,7 +124,8 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
 def is_drawn(study: Study, keys: Mapping[str, Any]) -> bool:
     """Whether the joint of a study has these values already: as a variation they would tell nothing."""
     with suppress(InputError):
-        return _of_joint(study, keys) == keys and with_value(study, keys).joint == study.joint
+        same = with_value(study, keys).joint.model_dump() == study.joint.model_dump()
+        return same and _of_joint(study, keys) == keys
     return False
 
 

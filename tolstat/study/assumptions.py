@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, input_error
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.joint import derived
@@ -118,6 +119,14 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     changed = replace(study, joint=joint, tolerances=study.tolerances | of_entries(study, keys))
     changed.check_mounting()
     return changed
+
+
+def is_drawn(study: Study, keys: Mapping[str, Any]) -> bool:
+    """Whether the joint of a study has these values already: as a variation they would tell nothing."""
+    with suppress(InputError):
+        same = with_value(study, keys).joint.model_dump() == study.joint.model_dump()
+        return same and _of_joint(study, keys) == keys
+    return False
 
 
 def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

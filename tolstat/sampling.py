@@ -58,7 +58,8 @@ def draw(study: Study, rows: range | None = None) -> Table:
     elif study.listed is not None:
         _fill_listed(samples, study.listed, numbers)
     else:
-        _fill_scatter(samples, study, numbers)
+        u = _uniforms(streams(study), numbers, study)
+        _fill_from(samples, study, u, _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {})
     return table
 
 
@@ -222,11 +223,6 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
         samples[name] -= np.array([_nominal(operation, name) for operation in design.operations])[variant]
 
 
-def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
-    u = _uniforms(streams(study), numbers, study)
-    _fill_from(samples, study, u, _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {})
-
-
 def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Array]:
     """Probabilities of the errors with lots, of samples of which several are of one lot."""
     size = study.sampling.joints_per_lot
@@ -257,16 +253,15 @@ def _fill_from(samples: Table, study: Study, u: dict[str, Array], of_lots: Mappi
             continue
         first, *second = axes.streams_of(name)
         drawn = distribution.ppf(u[first])
+        if second:
+            direction = 2 * np.pi * u[second[0]]
+            vector = np.array([drawn * np.cos(direction), drawn * np.sin(direction)])
+        else:
+            vector = axes.of_component(name, drawn)
         feature, _, key = name.partition(".")
-        vectors.setdefault(feature, {})[key] = (
-            _in_direction(drawn, 2 * np.pi * u[second[0]]) if second else axes.of_component(name, drawn)
-        )
+        vectors.setdefault(feature, {})[key] = vector
     for feature, parts in vectors.items():
         study.axes[feature].fill(samples, parts)
-
-
-def _in_direction(radius: Array, direction: Array) -> Array:
-    return np.array([radius * np.cos(direction), radius * np.sin(direction)])
 
 
 def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, Array]:

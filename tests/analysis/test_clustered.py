@@ -39,6 +39,24 @@ def test_fewer_than_thirty_lots_have_no_interval_and_lots_without_a_bad_joint_ha
     assert (found.lower, found.upper) == (pytest.approx(0.025 ** (1 / 50)), 1.0)
 
 
+def test_no_joint_above_has_no_wider_interval_than_some():
+    above = np.zeros((40, 6))
+    for number, lots in enumerate((1, 2, 5, 10, 40), start=1):
+        above[:lots, number] = 1
+    found = clustered.interval(np.hstack([above, 20 - above]), np.full(40, 20))
+    upper, lower = found.upper[:6], found.lower[6:]
+    assert upper[0] == pytest.approx(1.0 - 0.025 ** (1 / 40))
+    assert (upper >= upper[0]).all()
+    assert lower == pytest.approx(1.0 - upper)
+
+
+def test_interval_covers_where_lots_are_nearly_all_good_or_all_bad():
+    rng = np.random.default_rng(8)
+    above = np.stack([of_beta(0.04, 0.8, 40, 20, rng) for _ in range(400)], axis=1)
+    # 0.06 if lots without a bad joint had the end of the beta law
+    assert np.mean(clustered.interval(above, np.full(40, 20)).upper < 0.04) < 0.02
+
+
 def test_interval_covers_where_few_lots_have_the_bad_joints():
     rng = np.random.default_rng(7)
     above = np.stack([of_beta(0.02, 0.2, 50, 20, rng) for _ in range(800)], axis=1)

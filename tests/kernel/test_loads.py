@@ -75,8 +75,8 @@ def test_no_two_loads_share_a_name_a_field_or_a_column() -> None:
 
 def test_a_name_is_place_and_symbol() -> None:
     for name, load in LOADS.items():
-        assert name in {".".join(filter(None, (load.place.name, symbol))) for symbol in load.kind.symbols}
-        assert load.place.name in load.kind.places
+        assert (load.place.name, name) in load.kind.loads()
+        assert name.startswith(f"{load.place.name}." if load.place.name else load.kind.symbol)
 
 
 def test_loads_that_decide_are_compared_with_their_measure() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from tests.questions.test_change import TEXT, made, share_of
 from tests.questions.test_change import quick as quick
+from tests.support import synthetic
 from tests.support.two_errors import stand_in
 from tolstat import study
 from tolstat.campaign import blocks
@@ -207,6 +208,19 @@ def test_cost_is_of_a_feature_and_a_reciprocal_power(tmp_path: Path) -> None:
     table.write_text('"pin*.tilt_t" = { cost = 3 }\n"pin*.tilt_z" = { cost = 4 }\n', encoding="utf-8")
     with pytest.raises(InputError, match="has two costs for pin1"):
         costs.of([tilt], table)
+
+
+def test_widths_in_the_costs_may_have_the_sign_of_the_drawing(tmp_path: Path) -> None:
+    zone = '"*_pins.position" = { zone = "⌀0.3 mm", over = "145.64 mm", distribution = "normal", cp = 1.0 }\n'
+    plan = study.load(Path("made.toml"), text=f"{synthetic.HEAD}[tolerances]\n{zone}[sampling]\nn = 400\n")
+    (position,) = scaling.tolerances(plan)
+    table = tmp_path / "costs.toml"
+    table.write_text('"*_pins.position" = { at = "⌀0.15 mm", most = "0.6 mm" }\n', encoding="utf-8")
+    (cost,) = costs.of([position], table)
+    assert (cost.at(1.0), cost.reach[1]) == (pytest.approx(2 * 0.5), pytest.approx(2.0))  # of two pairs of pins
+    table.write_text('"*_pins.position" = { at = "±0.15 mm" }\n', encoding="utf-8")
+    with pytest.raises(InputError, match="is a band where another quantity is meant"):
+        costs.of([position], table)
 
 
 def test_steps_are_those_of_a_drawing() -> None:

@@ -143,6 +143,19 @@ def test_every_value_is_simulated_and_then_all_together(varied, quick):
 
 
 @pytest.mark.usefixtures("quick")
+def test_a_value_that_the_joint_has_is_not_varied(tmp_path):
+    other = '[{ shaft.axial = "free" }, { shaft.axial = "rigid" }]'
+    free = TEXT.replace(GIVEN, f'{GIVEN}shaft.axial = "free"\n')
+    both, alone = loaded(tmp_path, free.replace('[{ shaft.axial = "free" }]', other)), made(tmp_path, free)
+    assert [one.label for one in variations.singles(both) if one.name == "mounting"] == ["shaft rigid"]
+    assert simulated(alone).endswith("600 of each of 3 variations")
+    found = standing(alone)
+    assert "mounting" not in {*found.still, *found.missing, *found.names}
+    assert found.confidence == 1.0 - 0.05 / len(found.rows)
+    assert "Mounting: only as drawn is listed; give other values in [[assumed]]." in sentences.still(found)
+
+
+@pytest.mark.usefixtures("quick")
 def test_fewer_joints_than_the_campaign_has_are_an_answer(tmp_path):
     path = made(tmp_path)
     simulated(path, joints=100)
@@ -255,7 +268,7 @@ def test_sentences_of_each_case(tmp_path, varied):
     path = varied(slides=-60.0, arm=4.0)
     before = verdict(made(tmp_path), 0.5)
     assert before.answer == "yes"
-    assert before.sentence.endswith("; mounting and arm length not varied: tolstat assumptions made.h5 --run")
+    assert before.sentence.endswith("; 3 assumptions not varied: tolstat assumptions made.h5 --run")
     assert before.stands_on["answer"] is None
     share = of(standing(path), "shaft slides")["share"]
     shown = tolstat.display.text.percent

@@ -18,7 +18,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display.answer import Sentence
-from tolstat.questions.capability import capability
+from tolstat.questions.capability import LOTS, capability
 from tolstat.questions.capability import of_lots as of_lots_in
 from tolstat.report.page import write_page
 
@@ -60,6 +60,12 @@ def test_table_has_the_shares_of_the_lots_and_the_next_delivery():
     assert row["next_lower"] < 100 * above.mean() < row["next_upper"]
     said = [part.text for part in capability(made, delivery=100).parts if isinstance(part, Sentence)]
     assert said[0] == "40 lots of 20 joints; delivery: 100 joints of one new lot, 95 % prediction interval"
+
+
+@pytest.mark.parametrize(("high", "shown"), [(0.0, "0 %"), (0.05, "≥ 5 %")])
+def test_the_share_of_one_lot_in_ten_is_reached_not_exceeded(high, shown):
+    (column,) = [column for column in LOTS if column.head == "one lot in ten"]
+    assert column.cell({"high": high}) == shown
 
 
 def test_joints_without_a_load_count_both_ways():

@@ -32,9 +32,11 @@ def _loaded(folder, text, name="one"):
 
 def test_a_mean_off_centre_moves_with_its_band(tmp_path):
     mean = '"pin*.offset_t" = { plus_minus = "0.1 mm", mean = "0.045 mm", distribution = "normal", cpk = 0.8 }\n#'
-    (tolerance,) = scaling.tolerances(_loaded(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean)))
+    plan = _loaded(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean))
+    (tolerance,) = scaling.tolerances(plan)
     for factor in (0.25, 0.8, 2.0):
-        found = tolerance.distribution(tolerance.scaled(factor))
+        text = scaling.rewritten(plan, {tolerance.pattern: tolerance.scaled(factor)}, 1)
+        found = _loaded(tmp_path, text, "scaled").tolerances["pin1.offset_t"]
         assert (found.mean, found.sigma) == pytest.approx((factor * 4.5e-5, factor * 5.5e-5 / 2.4))
 
 

@@ -220,10 +220,11 @@ def _lower_mean(x: FloatArray, confidence: float) -> float:
     before = np.append(0.25, (0.25 + deviations[:-1]) / n[1:])
     bets = np.sqrt(2.0 * gain / (x.size * before))
 
-    def rejected(m: float) -> bool:
+    def rejected(less: FloatArray) -> bool:
+        m = mean - float(less)
         return bool(np.log1p(np.minimum(bets, STAKE / m) * (x - m)).sum() >= gain)
 
-    return mean - float(first(lambda less: rejected(mean - float(less)), 0.0, mean, halvings=40))
+    return mean - float(first(rejected, 0.0, mean, halvings=40))
 
 
 def looks(n: int, taken: Sequence[int] = ()) -> list[int]:
@@ -287,9 +288,8 @@ def next_look(width: float, planned: Sequence[int], count: int = 0, others: int 
     It is narrowest with the least or the largest count that a stop can have.
     """
     least = max(count, LEAST_BESIDE)
-    later = [
-        look for look in planned if look >= joints + max(least - count, 1) and look >= least + others + LEAST_BESIDE
-    ]
+    soonest = max(joints + max(least - count, 1), least + others + LEAST_BESIDE)
+    later = [look for look in planned if look >= soonest]
     most = np.minimum(count - joints, -others - LEAST_BESIDE) + later
     possible = narrow(width, least, others, later) | narrow(width, most, others, later)
     return later[int(possible.argmax())] if possible.any() else planned[-1]

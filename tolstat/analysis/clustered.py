@@ -3,7 +3,8 @@
 Lots are independent of each other, joints of one lot are not. Intervals of shares come from the lots' shares (Student's
 t on the logit of their mean), and predictions from the beta-binomial law: the share of a lot is a beta variate. Where
 few lots have the joints above a limit, lots that are worse may not have been seen: there, the interval contains that of
-the beta-binomial law, too.
+the beta-binomial law, too. No interval excludes what lots without any such joint leave possible: lots all of whose
+joints are above, and none of which was seen.
 """
 
 from __future__ import annotations
@@ -68,8 +69,9 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
     -------
     LotShares
         Where no joint is above a limit, or each, the share of lots with such a joint bounds that of the joints: its end
-        is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
-        lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
+        is Clopper and Pearson's for lots, 1 - (α/2)^(1/lots). With more joints above, the upper end is no lower. Where
+        the joints on a side of the limit, (sum of k)² / sum of k² over the lots, are effectively fewer than `FEW`, the
+        interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
     """
     k = np.asarray(above, dtype=float)
     n = np.asarray(joints, dtype=float)
@@ -87,8 +89,8 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         if few.any() and lots >= LEAST:
             credible = _credible(k[:, few], n[:, few], confidence)
             lower[few], upper[few] = np.minimum(lower[few], credible[0]), np.maximum(upper[few], credible[1])
-        lower = np.where(p == 0.0, 0.0, np.where(p == 1.0, 1.0 - none, lower))
-        upper = np.where(p == 1.0, 1.0, np.where(p == 0.0, none, upper))
+        lower = np.where(p == 0.0, 0.0, np.fmin(lower, 1.0 - none))  # Student's ends are NaN where p is 0 or 1
+        upper = np.where(p == 1.0, 1.0, np.fmax(upper, none))
         # analysis of variance of the joints, 0 or 1, with lots of different size
         inside = (k * (1.0 - k / n)).sum(axis=0) / (total - lots)
         outside = ((k - p * n) ** 2 / n).sum(axis=0) / (lots - 1.0)
@@ -149,7 +151,7 @@ class Clustered(Design):
     of_quantiles = "over lots"
     of_delivery = " of one new lot"
     ranks_at_once = 2000
-    innermost = True  # a share has a higher end with no joint above than with one
+    innermost = True  # a share has a higher end where few lots have the joints above
 
     def __init__(self, lots: NDArray[np.intp]) -> None:
         self.numbers, self._lots = np.unique(lots, return_inverse=True)

@@ -89,10 +89,8 @@ class Cycles(NamedTuple):
         names = tuple(dict.fromkeys(self.channels))
         if names == self.channels:
             return self
-        damaged, index = (
-            np.nan_to_num(moment(self, m), posinf=np.inf),
-            np.empty((len(self.number), len(names)), np.intp),
-        )
+        damaged = np.nan_to_num(moment(self, m), posinf=np.inf)
+        index = np.empty((len(self.number), len(names)), np.intp)
         for c, name in enumerate(names):
             same = np.array([i for i, other in enumerate(self.channels) if other == name])
             index[:, c] = same[np.argmax(damaged[:, same], axis=1)]

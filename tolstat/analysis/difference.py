@@ -111,10 +111,8 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
     kind = _pairs if paired else _apart
-    fields, least, most = (
-        kind(x, y, a.design, b.design, level, confidence)
-        for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
-    )
+    sides = (a.value, b.value), (a.upper, b.lower), (a.lower, b.upper)
+    fields, least, most = (kind(x, y, a.design, b.design, level, confidence) for x, y in sides)
     p = np.full(level.shape, np.nan)
     if paired and a.design.independent and b.design.independent:
         only_a, only_b = fields[3:5]

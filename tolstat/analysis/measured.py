@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from tolstat.analysis.binomial import half_width
 from tolstat.common.late import special
@@ -14,23 +13,10 @@ CONFIDENCE = 0.9
 """Confidence level of the intervals."""
 
 
-class Process(NamedTuple):
-    """A process in terms of its parts.
-
-    Attributes
-    ----------
-    spread : float
-        Its standard deviation over that of the parts.
-    mean : float
-        Its mean less that of the parts, in standard deviations of the parts.
-    """
-
-    spread: float = 1.0
-    mean: float = 0.0
-
-
 def spreads(parts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Ends of the interval of `Process.spread`: (n - 1) s^2 / sigma^2 is chi-squared with n - 1 degrees of freedom.
+    """Ends of the interval of the deviation sigma of a process over that of its parts, s.
+
+    (n - 1) s^2 / sigma^2 is chi-squared with n - 1 degrees of freedom.
 
     Examples
     --------
@@ -43,7 +29,9 @@ def spreads(parts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
 
 
 def means(parts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Ends of the interval of `Process.mean`, by Student's t with n - 1 degrees of freedom.
+    """Ends of the interval of the mean of a process less that of its parts, in deviations of the parts.
+
+    By Student's t with n - 1 degrees of freedom.
 
     Examples
     --------

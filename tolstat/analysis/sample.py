@@ -180,9 +180,8 @@ class Sample:
         if np.isnan(x).any():
             raise ValueError("a level is NaN")
         share = self.design.shares(self.value, x, confidence)
-        low, high = (
-            share if end is self.value else self.design.shares(end, x, confidence) for end in (self.lower, self.upper)
-        )
+        ends = self.lower, self.upper
+        low, high = (share if end is self.value else self.design.shares(end, x, confidence) for end in ends)
         rows = np.zeros(x.shape, CURVE)
         rows["level"], rows["count"], rows["n"] = x, self.value.above(x), self.value.n + sum(self.unresolved)
         rows["n_failed"], rows["n_unsettled"] = self.unresolved

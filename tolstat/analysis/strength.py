@@ -202,8 +202,6 @@ def weakest(places: Sequence[Collective], line: Line) -> Collective:
     line : Line
         S–N line.
     """
-    if len(places) == 1:
-        return places[0]
     worst = np.argmax(np.nan_to_num([critical_factor(place, line) for place in places]), axis=0)
     return Collective(*(np.stack(field)[worst, np.arange(len(worst))] for field in zip(*places, strict=True)))
 

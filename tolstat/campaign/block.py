@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.pool import Lost, Work
-from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
+from tolstat.common.loads import LOADS
+from tolstat.common.tables import PARAM, VALID, HistorySpec, Options, Simulation, Status, without_results
 
 
 class Block(NamedTuple):
@@ -80,6 +81,17 @@ def simulate_block(
 def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
     """Return what the file stores for `n` joints that have no results: the given status and NaN."""
     return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
+
+
+def spread(rows: int, count: int) -> NDArray[np.intp]:
+    """Return `count` of so many rows, or all, at equal distances, ascending."""
+    return np.unique(np.linspace(0, rows - 1, min(count, rows)).astype(np.intp))
+
+
+def loads_of(results: NDArray[np.void], names: Sequence[str]) -> NDArray[np.float64]:
+    """Loads of joints, (m, loads), SI, NaN where a joint is not valid; from a table RESULT, (m,)."""
+    loads = np.column_stack([LOADS[name].of(results) for name in names])
+    return np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
 
 
 def results_of(block: Block, result: Timed | Lost) -> NDArray[np.void]:

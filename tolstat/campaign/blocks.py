@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import pool
-from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, simulate_block, without_simulation
+from tolstat.campaign.block import (
+    Block,
+    BlockWork,
+    load_kernels,
+    results_of,
+    simulate_block,
+    spread,
+    without_simulation,
+)
 from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
@@ -163,7 +171,7 @@ def compile_missing(options: Options, params: NDArray[np.void] | None = None) ->
 def compile_for(study: Study, store: Reader) -> None:
     """Compile what some joints at each point need: kernels that none of them needs are not compiled ahead."""
     first = min(store.n, READ)
-    slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
+    slots = spread(first, SOME)
     errors = store.errors(slice(0, first))[slots]
     each = [perturbed(study.at(at_point.point or ""), at_point.row(slots), errors) for at_point in store.each()]
     for options in settings_in_use(study, store):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
@@ -116,7 +115,7 @@ def grow(
         When the file cannot be replaced.
     """
     changes = {
-        "identity": json.loads(json.dumps(study.identity())),
+        "identity": study.identity(),
         "sampling": study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
         "stop": {"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
         "campaign_rows": study.rows,

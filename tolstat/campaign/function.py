@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.campaign import pool
-from tolstat.campaign.block import Block, Timed, results_of, simulate_block
+from tolstat.campaign.block import Block, Timed, loads_of, results_of, simulate_block, spread
 from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
 from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, input_error, raise_all
-from tolstat.common.loads import LOADS, SHOWN_LOADS, UNIT_OF_LOAD
-from tolstat.common.tables import VALID, Options
+from tolstat.common.loads import SHOWN_LOADS, UNIT_OF_LOAD
+from tolstat.common.tables import Options
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
@@ -252,16 +252,14 @@ class Function:
         if is_alone:
             finished = ((block, simulate_block(simulate_rows, "none", 0, {}, block)) for block in blocks)
         else:
-            some = np.unique(np.linspace(0, n - 1, min(n, SOME)).astype(np.intp))
+            some = spread(n, SOME)
             for own in distinct:  # once, before the processes start
                 compile_missing(own, parameters_of(study, variant[some], errors[some]))
             finished = pool.map_blocks(work_beside(*distinct), blocks, workers)
         with closing(finished):
             for block, result in finished:
                 table = results_of(block, result)
-                self.status[block.slots], valid = table["status"], np.isin(table["status"], VALID)
-                values = np.column_stack([LOADS[name].of(table) for name in self.loads])
-                loads[block.slots] = np.where(valid[:, None], values, np.nan)
+                self.status[block.slots], loads[block.slots] = table["status"], loads_of(table, self.loads)
         return loads
 
 

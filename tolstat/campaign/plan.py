@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import verify
+from tolstat.campaign.block import spread
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
@@ -44,7 +45,6 @@ SHARES = (0.5, 0.1, 0.01)
 QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
 """Newton iterations of a joint that does not rattle, from `studies/rigid_shafts.toml` with the default settings."""
-CONFIDENCE = 0.95
 DRAWN = 1 << 14
 """Largest number of joints whose clearances are computed."""
 LOOPS = 5
@@ -225,7 +225,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     if pilot == PILOT < study.rows:
         pilot = _affordable(study, choice)
-    rows = _spread(study, pilot)
+    rows = spread(study.rows, pilot)
     at, options = _joints(study, rows, choice)
     timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
@@ -251,7 +251,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         seconds_per_joint=each,
         workers=workers,
         stages=stages,
-        process_bytes=_process_bytes(),
+        process_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024),
         file_bytes=layout.size_of(document) + len(document.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],
@@ -266,16 +266,14 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     )
 
 
-def _spread(study: Study, count: int) -> NDArray[np.intp]:
-    """Rows of a study at equal distances, `count` of them or all."""
-    return np.unique(np.linspace(0, study.rows - 1, min(count, study.rows)).astype(np.intp))
-
-
 def _joints(
     study: Study, rows: NDArray[np.intp], choice: dict[str, Any]
 ) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
     """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
-    errors = _errors(study, rows)
+    if study.sampling.method == "lhs":
+        errors = draw(study)[rows]
+    else:
+        errors = np.concatenate([draw(study, range(row, row + 1)) for row in rows])
     each_options = [settings(solver, choice) for solver in study.solvers]
     at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
     return at, [each_options[number] for number in variants(study, rows)]
@@ -283,7 +281,7 @@ def _joints(
 
 def _affordable(study: Study, choice: dict[str, Any]) -> int:
     """Size of the default pilot, or as many joints as take `PILOT_S`, by the time of the first ones."""
-    at, options = _joints(study, _spread(study, FIRST), choice)
+    at, options = _joints(study, spread(study.rows, FIRST), choice)
     spent = sum(simulate_timed(study, params, options)[1] for params in at.values())
     return int(np.clip(FIRST * PILOT_S / max(spent, 1e-9), FIRST, PILOT))
 
@@ -332,12 +330,6 @@ def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals
     return Reversals(int(here.sum()), float(torque[here].max()), float(work[here].mean()) / max(others, 1.0))
 
 
-def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    if study.sampling.method == "lhs":
-        return draw(study)[rows]
-    return np.concatenate([draw(study, range(row, row + 1)) for row in rows])
-
-
 def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[NDArray[np.void], float]:
     """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
     for distinct in dict.fromkeys(options):
@@ -362,8 +354,3 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
         nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, share.count, valid, _width(nearest_half, study.samples)))
     return plans
-
-
-def _process_bytes() -> int:
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else 1024 * peak)

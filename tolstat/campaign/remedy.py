@@ -20,7 +20,7 @@ from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
 from tolstat.study import Study
-from tolstat.study.rewriting import given
+from tolstat.study.rewriting import parsed
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
@@ -199,11 +199,11 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     changed: dict[str, Any] = {}
     for text in settings:
         with gather(faults):
-            key, equals, value = text.partition("=")
-            if not (equals and key.startswith("solver.")):
-                example = "write --set solver.steps_per_rev=360"
+            example = "write --set solver.steps_per_rev=360"
+            path, value = parsed(text, "--set", example)
+            if path[0] != "solver":
                 raise input_error("--set", f"{text!r} is not a solver setting", example)
-            changed[key.strip()] = given(value)
+            changed[".".join(path)] = value
     solver = study.solver
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}

@@ -23,7 +23,7 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
-from tolstat.study import Case
+from tolstat.study import Study
 
 
 class CaseResult(NamedTuple):
@@ -126,12 +126,12 @@ def _components(history: LoadHistory, histories: Mapping[str, NDArray[Any]]) -> 
     }
 
 
-def simulate_case(case: Case) -> CaseResult:
+def simulate_case(case: Study) -> CaseResult:
     """Simulate the joint of a case file, and the same joint without errors.
 
     Parameters
     ----------
-    case : Case
+    case : Study
         As `study.load_case` reads it.
 
     Returns
@@ -141,14 +141,17 @@ def simulate_case(case: Case) -> CaseResult:
     errors = nominal_errors(2)
     for name, value in case.errors.items():
         errors[name][0] = value
-    params = perturb(case.joint, case.operation, errors)
-    warm_up()
-    begin = time.perf_counter()
-    options = case.solver.options()
-    both = simulate_rows(params, options, "full")
-    wall_s = time.perf_counter() - begin
+    params, options = perturb(case.joint, case.operation, errors), case.solver.options()
+    both, wall_s = _timed(params, options)
     with_errors = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
     return CaseResult(with_errors, params[:1], wall_s, options, both.results[1:])
+
+
+def _timed(params: NDArray[np.void], options: Options) -> tuple[Simulation, float]:
+    """Joints with full histories, and the time of their simulation without compilation, s."""
+    warm_up()
+    begin = time.perf_counter()
+    return simulate_rows(params, options, "full"), time.perf_counter() - begin
 
 
 def _number(value: float) -> float | None:
@@ -231,10 +234,8 @@ def replay(store: Reader, row: int) -> Replay:
         raise input_error(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")
     params = parameters(store, np.array([here.start]))
     options = options_of(store, here.start)
-    warm_up()
-    begin = time.perf_counter()
-    simulation = simulate_rows(params, options, "full")
-    result = CaseResult(simulation, params, time.perf_counter() - begin, options)
+    simulation, wall_s = _timed(params, options)
+    result = CaseResult(simulation, params, wall_s, options)
     differences = []
     for c in store.columns:
         before, now = (np.ascontiguousarray(c.of(table)) for table in (stored, simulation.results))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -108,10 +107,8 @@ class Interrupted(Exception):
         self.path = path
         self.counts = counts
         self.exit_code = 128 + number
-        super().__init__(
-            f"stopped: {path} holds the results of {counts.done} of {counts.total} joints\n"
-            "  hint: to resume, run the same command again"
-        )
+        held = f"{path} holds the results of {counts.done} of {counts.total} joints"
+        super().__init__(f"stopped: {held}\n  hint: to resume, run the same command again")
 
 
 def run(
@@ -288,7 +285,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:
-    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    differing = differing_keys(store.identity, study.identity())
     found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"

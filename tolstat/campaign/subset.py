@@ -7,7 +7,6 @@ the loads in the file determine the next joints, so that an interrupted run resu
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -124,8 +123,7 @@ def run(plan: Study, out: Path, work: Work) -> None:
     if out.exists():
         with ResultFile.open(out) as store:
             rows = store.n
-            wanted = json.loads(json.dumps(_sized(plan, rows).identity()))
-            is_whole = store.complete and not differing_keys(store.identity, wanted)
+            is_whole = store.complete and not differing_keys(store.identity, _sized(plan, rows).identity())
     if not is_whole:  # a whole file is read by any version of the code; otherwise it must be of the same plan and code
         _simulate(plan, out, rows, rows, work)
     while not subsets.walk.done:

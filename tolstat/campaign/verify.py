@@ -132,7 +132,7 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     done = pool.map_blocks(Work(_reference), joints, min(workers, len(joints)))
-    results, counts = tables.without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
+    results, counts = tables.without_results(len(joints), Status.CRASHED), Counts(len(joints))
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:
@@ -265,13 +265,7 @@ def check_file(path: Path, joints: int | None, seed: int | None = None, make: Ma
         for at_point in store.each():
             if verified := check_campaign(at_point, joints, seed, make):
                 verification.write([(at_point, verified)])
-        return _stored(store, verification.VERIFY)
-
-
-def _stored(store: Reader, name: str) -> Verification:
-    """Verifications of a group at all operating points at which the file has one."""
-    verifications = [verification.read(at_point, name) for at_point in store.each()]
-    return verification.together([read for read in verifications if read is not None])
+        return verification.together(verification.read_each(store.each(), verification.VERIFY))
 
 
 def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
@@ -340,7 +334,7 @@ def check_near(
                 checked = check_slots(at_point, new, 0, make)
                 merged = checked if before is None else _merged(before, checked)
                 verification.write([(at_point, merged)], verification.NEAR)
-        return _stored(store, verification.NEAR)
+        return verification.together(verification.read_each(store.each(), verification.NEAR))
 
 
 def _merged(*both: Verification) -> Verification:

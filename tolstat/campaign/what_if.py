@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.campaign import pool
-from tolstat.campaign.block import Block, Timed, results_of
+from tolstat.campaign.block import Block, Timed, loads_of, results_of
 from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import VALID, Options, Status, worst_status
+from tolstat.common.tables import Options, Status, worst_status
 from tolstat.joint import perturb
 from tolstat.store import Reader, Writer, what_if
 from tolstat.store.hdf5 import store_error
@@ -64,24 +63,17 @@ class Change(NamedTuple):
 def stepped(study: Study, line: Group, step: str, numbers: range) -> Change:
     """A line after a step (`widths.steps`); joint i is sample i of the campaign but for this line."""
     changed = widths.after(study, line, step)
-    about = {
-        "kind": WIDTH,
-        "label": line.label,
-        "step": step,
-        "words": widths.words(study, line, step),
-        "seed": study.sampling.seed,
-        "tolerances": {name: changed.tolerances[name].describe() for name in line.names},
-    }
-    if step not in widths.STEPS and changed.fit is not None:
-        about |= {"kind": FIT, "diameters": changed.fit.diameters}
-    return Change(about, changed, partial(_draw, changed), numbers)
+    about: dict[str, Any] = {"step": step, "words": widths.words(study, line, step)}
+    about |= {"tolerances": {name: changed.tolerances[name].describe() for name in line.names}}
+    if step in widths.STEPS or changed.fit is None:
+        return _change(WIDTH, line.label, changed, numbers, **about)
+    return _change(FIT, line.label, changed, numbers, **about, diameters=changed.fit.diameters)
 
 
 def exchanged(study: Study, line: Group, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
-    about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
-    unchanged = widths.applied(study, {})
-    return Change(about, unchanged, partial(_exchange, unchanged, line), numbers)
+    change = _change(EXCHANGE, line.label, study, numbers, names=list(line.names))
+    return change._replace(draw=partial(_exchange, change.study, line))
 
 
 def about_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,27 +90,25 @@ def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
     InputError
         When the keys make no valid joint.
     """
-    changed = widths.applied(with_value(study, keys), {})
-    return Change(about_joint(study, keys), changed, partial(_draw, changed), numbers)
-
-
-def about_study(study: Study, changed: Study, label: str) -> dict[str, Any]:
-    """Return `Altered.about` of samples of a changed study; the label says the change in words."""
-    keys = {"differs": differing(study, changed)}
-    return {"kind": STUDY, "label": label, "seed": changed.sampling.seed} | keys
+    about = about_joint(study, keys)
+    return _change(JOINT, about["label"], with_value(study, keys), numbers, keys=about["keys"])
 
 
 def with_study(study: Study, changed: Study, label: str, numbers: range) -> Change:
-    """Joint i is sample i of a changed study, `study.changes.read`, drawn with its seed."""
-    drawn = widths.applied(changed, {})
-    return Change(about_study(study, changed, label), drawn, partial(_draw, drawn), numbers)
+    """Joint i is sample i of a changed study, `study.changes.read`, drawn with its seed; the label says the change."""
+    return _change(STUDY, label, changed, numbers, differs=differing(study, changed))
 
 
 def as_drawn(study: Study, numbers: range) -> Change:
     """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
-    about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
-    unchanged = widths.applied(study, {})
-    return Change(about, unchanged, partial(_draw, unchanged), numbers)
+    return _change(AS_DRAWN, "no line", study, numbers)
+
+
+def _change(kind: str, label: str, changed: Study, numbers: range, **about: Any) -> Change:
+    """Samples of a changed study, drawn at random with its seed."""
+    drawn = widths.applied(changed, {})
+    head = {"kind": kind, "label": label, "seed": drawn.sampling.seed}
+    return Change(head | about, drawn, partial(_draw, drawn), numbers)
 
 
 class Asked(NamedTuple):
@@ -201,7 +191,7 @@ def simulate(
     table = _Table(todo, asked, names)
     blocks = _blocks(options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), blocks, workers, stop)
-    counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
+    counts, saved = Counts(table.status.size), time.monotonic()
     progress(counts)
     try:
         with closing(done):
@@ -236,9 +226,7 @@ class _Table:
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
         index = block.slots, self.asked.points.index(block.point)
-        loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
-        self.loads[index] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
-        self.status[index] = results["status"]
+        self.loads[index], self.status[index] = loads_of(results, self.asked.loads), results["status"]
         return np.asarray(self.status[index])
 
     def sets(self, in_file: Mapping[str, Altered]) -> dict[str, Altered]:

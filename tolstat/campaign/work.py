@@ -7,14 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tolstat.common.late import Late
 from tolstat.display.progress import Display, silent
 
 if TYPE_CHECKING:
-    from tolstat.campaign import run as campaign
     from tolstat.study import Study
-else:
-    campaign = Late("tolstat.campaign.run")  # of a question that simulates, `--help` reads this file
 
 
 @dataclass(frozen=True)
@@ -52,8 +48,9 @@ class Work:
         StoreError, Interrupted, WorkerDied
             As `campaign.run.run`.
         """
-        path = self.folder / name
-        shown = self.display
-        counts = campaign.run(study, path, self.workers, progress=shown, tell=self.tell, stage=shown.stage)
+        from tolstat.campaign.run import run  # of a question that simulates, `--help` reads this file
+
+        path, shown = self.folder / name, self.display
+        counts = run(study, path, self.workers, progress=shown, tell=self.tell, stage=shown.stage)
         self.tell(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
         return path

@@ -126,12 +126,7 @@ SUBSET_FIELDS = (
 )
 SUBSET = dtype_of(SUBSET_FIELDS)
 
-METHODS = {
-    "random": "random sampling",
-    "sobol": "Sobol' points",
-    "lhs": "Latin hypercube",
-    "sweep": "sweep",
-}
+METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
 """Sampling methods in words."""
 DRAWN = ("random", "sobol", "lhs")
 """Sampling methods that draw every joint from the tolerances."""

@@ -30,16 +30,16 @@ class Counts(NamedTuple):
     """
 
     total: int
-    done: int
-    unsettled: int
-    failed: int
+    done: int = 0
+    unsettled: int = 0
+    failed: int = 0
     not_resolved: int = 0
     points: int = 1
 
     @classmethod
     def of(cls, status: NDArray[np.uint8]) -> Counts:
         """Count joints by their `status`, (m,)."""
-        return cls(len(status), 0, 0, 0).after(status)
+        return cls(len(status)).after(status)
 
     @property
     def counted(self) -> str:

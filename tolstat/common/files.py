@@ -85,10 +85,8 @@ def finite(cell: str | None) -> float:
 def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:
     """Say what a file is that is not UTF-8 text, and the remedy."""
     content, remedy = error.object, "save it as UTF-8"
-    if content.startswith(UTF_16) or content[:WIDE].count(0) in (
-        len(content[:WIDE]) // 2,
-        (len(content[:WIDE]) + 1) // 2,
-    ):
+    head = content[:WIDE]
+    if content.startswith(UTF_16) or abs(2 * head.count(0) - len(head)) < 2:
         return "is UTF-16 text, not UTF-8", remedy
     if b"\0" in content:
         return "is not UTF-8 text", "give a text file"

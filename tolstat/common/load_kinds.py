@@ -107,11 +107,6 @@ class Kind(NamedTuple):
     components: tuple[str, ...] = ()
 
     @property
-    def symbols(self) -> tuple[str, ...]:
-        """What stands after a place in the names of its loads there, one for each."""
-        return tuple(f"{self.symbol}_{n}x" for n in self.orders) or (self.symbol,)
-
-    @property
     def shape(self) -> tuple[int, ...]:
         """Shape of its fields in the results, without the interval's."""
         several = self.places if self.places != JOINT else ()
@@ -124,7 +119,8 @@ class Kind(NamedTuple):
 
     def loads(self) -> list[tuple[str, str]]:
         """Place and name of each of its loads: ``("cross1", "cross1.F")`` and so on."""
-        return [(place, f"{place}.{symbol}" if place else symbol) for place in self.places for symbol in self.symbols]
+        symbols = [f"{self.symbol}_{n}x" for n in self.orders] or [self.symbol]
+        return [(place, f"{place}.{symbol}" if place else symbol) for place in self.places for symbol in symbols]
 
     def columns(self, statistic: str) -> tuple[str, ...]:
         """Columns of a statistic, ``"max"``, ``"mean"`` or ``"range"``: ``pin1.contact_outer_max`` and so on."""

@@ -241,11 +241,7 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.alpha", "rad", "deviation of the shafts' misalignment from that of the operating point"),
         Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
         Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
-        Field(
-            "material.E_factor",
-            "1",
-            "factor on Young's modulus: bushings, their damping, contact coefficients",
-        ),
+        Field("material.E_factor", "1", "factor on Young's modulus: bushings, their damping, contact coefficients"),
         *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in pins),
         Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),

@@ -96,11 +96,14 @@ def of_keys(text: str) -> dict[KeyPath, int]:
         if statement.lstrip().startswith("["):
             table = _table(data, lines, sizes, number)
         else:
-            for path in _paths(data, before):
+            for path in paths(data, before):
                 lines.setdefault((*table, *path), first)
         if closing == "]" and _blanked(statement).rstrip().endswith(","):
             # the items of a list so far are known: read on from its bracket, or a long list takes long
-            before += len(_items(data))
+            items: Any = data
+            while isinstance(items, dict):
+                (items,) = items.values()
+            before += len(items)
             statement = statement[: opened[0] + 1]
         elif not closing:
             statement, before = "", 0
@@ -140,21 +143,13 @@ def _open(statement: str) -> list[int]:
     return opened
 
 
-def _items(data: Any) -> list[Any]:
-    """The list that a statement gives to its key."""
-    while isinstance(data, dict):
-        (data,) = data.values()
-    items: list[Any] = data
-    return items
-
-
-def _paths(data: object, before: int = 0) -> Iterator[KeyPath]:
+def paths(data: object, before: int = 0) -> Iterator[KeyPath]:
     """Key paths of nested tables and lists; the first item of the outermost list has the index `before`."""
     if isinstance(data, dict):
         for key, value in data.items():
             yield (key,)
-            yield from ((key, *path) for path in _paths(value, before))
+            yield from ((key, *path) for path in paths(value, before))
     elif isinstance(data, list):
         for index, value in enumerate(data, before):
             yield (index,)
-            yield from ((index, *path) for path in _paths(value))
+            yield from ((index, *path) for path in paths(value))

@@ -11,7 +11,7 @@ import sys
 import tokenize
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -79,16 +79,7 @@ def registry() -> pint.UnitRegistry[float]:
     return units
 
 
-@lru_cache(maxsize=1024)
-def _parsed(written: Written) -> Any:
-    """Give the number its unit; cached, because variants of a joint share most values."""
-    return registry().Quantity(written.number, notation.pint_unit(written.unit) or "dimensionless")
-
-
-_NOT_PARSED = (
-    *(ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError, AssertionError, LookupError),
-    tokenize.TokenError,
-)
+_NOT_PARSED = ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError, AssertionError, LookupError
 """Exceptions besides pint's own that its parser raises for a text that is not a unit."""
 
 
@@ -174,14 +165,15 @@ def _value(read: Written, unit: str, value: str) -> float:
     import pint
 
     try:
-        return _convert(_parsed(read), unit, value)
+        quantity = registry().Quantity(read.number, notation.pint_unit(read.unit) or "dimensionless")
+        return _convert(quantity, unit, value)
     except PydanticCustomError:
         raise
     except pint.DimensionalityError as error:
         raise _fault(f"{value!r} cannot be a value in {unit}", unit) from error
     except pint.UndefinedUnitError as error:
         raise _fault(f"{value!r} has an unknown unit", unit) from error
-    except (pint.PintError, *_NOT_PARSED) as error:
+    except (pint.PintError, tokenize.TokenError, *_NOT_PARSED) as error:
         raise _fault(f"{value!r} is not a number with a unit", unit) from error
 
 
@@ -275,9 +267,8 @@ class Quantity:
             si = isinstance(value, float) and bool(info.context and info.context.get("si"))
             return to_si(value, "1" if si else self.unit, self.mark)
 
-        return core_schema.with_info_plain_validator_function(
-            read, serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
-        )
+        writing = core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
+        return core_schema.with_info_plain_validator_function(read, serialization=writing)
 
     def _word(self, value: str) -> str:
         if value in self.words:

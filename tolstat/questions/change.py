@@ -146,7 +146,7 @@ class _Asked:
         self.text = changes.with_settings(view.study, settings)
         self.study = changes.read(view.study, self.text)
         self.label = ", ".join("=".join(part.strip() for part in setting.split("=", 1)) for setting in settings)
-        self.about = sets.about_study(view.study, self.study, self.label)
+        self.about = sets.with_study(view.study, self.study, self.label, range(0)).about
         if not self.about["differs"]:
             raise input_error(f"--set {self.label}", "changes nothing", "give a value that is not that of the study")
 

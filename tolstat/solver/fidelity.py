@@ -89,9 +89,8 @@ def choose(
     """
     names = tuple(loads) or SHOWN_LOADS
     truth = simulate(params, _at(options, REFERENCE)).results
-    rungs = [
-        rung for rung in RUNGS if rung.steps_per_rev >= min_steps and (closed_form or rung.fidelity != Fidelity.IDEAL)
-    ]
+    able = RUNGS if closed_form else [rung for rung in RUNGS if rung.fidelity != Fidelity.IDEAL]
+    rungs = [rung for rung in able if rung.steps_per_rev >= min_steps]
     table = [_entry(rung, simulate(params, _at(options, rung)).results, truth, names) for rung in rungs]
     settled = [entry for entry in table if entry["differing"] == 0 and entry["worst"] is not None]
     good = [entry for entry in settled if MARGIN * entry["worst"] <= budget]

@@ -74,10 +74,8 @@ def extracted(
         fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    loads = {
-        BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
-        SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
-    }
+    pairs = zip(LOAD_HISTORIES, ("components", "shafts"), strict=True)
+    loads = {history.name: np.ascontiguousarray(samples[field]) for history, field in pairs}
     sample = cycles(loads) if "cycles" in histories else {}
     if "harmonics" in histories:
         sample |= coefficients(loads, specs["coefficients_real"].shape[-1])

@@ -102,7 +102,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
     if from_start:
-        t0, y0 = 0.0, _start(params, options)
+        is_ramp, at_rest = options.start == Start.RAMP, np.zeros(mechanism.dof)
+        t0, y0 = 0.0, np.concatenate([at_rest if is_ramp else equilibrium(params, options, mechanism), at_rest])
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
@@ -132,13 +133,6 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     scale = np.repeat([LENGTH, VELOCITY], CARDAN.dof)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
-
-
-def _start(params: NDArray[np.void], options: Options) -> FloatArray:
-    """Initial state of the solver at time zero, (112,)."""
-    if options.start == Start.RAMP:
-        return np.zeros(2 * CARDAN.dof)
-    return np.concatenate([equilibrium(params, options), np.zeros(CARDAN.dof)])
 
 
 def reference_rows(

@@ -10,11 +10,11 @@ that the tail is not exponential, the upper end is that of an exponential one if
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID, Status
@@ -42,14 +42,6 @@ STEP_ERROR = 0.01
 """Relative error of a load that the time steps may cause: no interval is narrower on either side."""
 
 Table = NDArray[np.void]
-
-
-class Interval(NamedTuple):
-    """Largest load of many revolutions: median, and ends of the interval; each shape (m,)."""
-
-    median: FloatArray
-    lower: FloatArray
-    upper: FloatArray
 
 
 def classify(results: Table, blocks: Table, duration: int) -> None:
@@ -127,7 +119,7 @@ def _alike(series: FloatArray, size: float) -> bool:
     return level and bool(spreads.max() <= max(MAX_SPREAD_RATIO * spreads.min(), small))
 
 
-def largest(values: FloatArray, duration: int) -> Interval:
+def largest(values: FloatArray, duration: int) -> Estimate[FloatArray]:
     """Predict the largest of `duration` further revolutions from the largest loads of each of those watched.
 
     Parameters
@@ -139,9 +131,9 @@ def largest(values: FloatArray, duration: int) -> Interval:
 
     Returns
     -------
-    Interval
-        Median, and ends between which the largest lies with `CONFIDENCE`; the uncertainty of the fit is included by
-        fits to samples of the fitted distribution (parametric bootstrap). Upper end: see above.
+    Estimate
+        Median, (m,), and ends between which the largest lies with `CONFIDENCE`; the uncertainty of the fit is included
+        by fits to samples of the fitted distribution (parametric bootstrap). Upper end: see above.
     """
     n, m = values.shape
     count = max(3, round(TAIL_SHARE * n))
@@ -160,7 +152,7 @@ def largest(values: FloatArray, duration: int) -> Interval:
     exponential = threshold + times * excesses.mean(axis=0)
     upper = np.where(shape < shown, upper, np.maximum(upper, exponential))
     off = STEP_ERROR * np.abs(median)
-    return Interval(median, lower - off, upper + off)
+    return Estimate(median, lower - off, upper + off)
 
 
 @lru_cache

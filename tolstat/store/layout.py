@@ -102,13 +102,10 @@ def datasets(metadata: Metadata) -> list[Stored]:
     at_points = {group: groups.pop(group) for group in AT_POINTS if group in groups}
     stored = [Stored(path_of("", g, c.name), np.dtype(c.dtype), (n,)) for g, each in groups.items() for c in each]
     for point in metadata.points:
-        stored += [
-            Stored(path_of(point, g, c.name), np.dtype(c.dtype), (n,)) for g, each in at_points.items() for c in each
-        ]
-        stored += [
-            Stored(path_of(point, "histories", name), np.dtype(spec.dtype), (n, *spec.shape))
-            for name, spec in metadata.histories.items()
-        ]
+        for group, each in at_points.items():
+            stored += [Stored(path_of(point, group, c.name), np.dtype(c.dtype), (n,)) for c in each]
+        for name, spec in metadata.histories.items():
+            stored.append(Stored(path_of(point, "histories", name), np.dtype(spec.dtype), (n, *spec.shape)))
     return stored
 
 

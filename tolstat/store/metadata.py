@@ -114,7 +114,7 @@ def of_study(
     """
     return Metadata(
         **editable(study),
-        identity=json.loads(json.dumps(study.identity())),
+        identity=study.identity(),
         options=to_names(options or study.solver.options()),
         fidelity=dict(fidelity or {}),
         sampling=study.sampling.model_dump(mode="json") | {"dimensions": dict(dimensions)},

@@ -202,7 +202,7 @@ class Reader:
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
-        counts = Counts(self.n * len(each), 0, 0, 0, points=len(each))
+        counts = Counts(self.n * len(each), points=len(each))
         for at_point in each:
             counts = counts.after(at_point.status())
         return counts

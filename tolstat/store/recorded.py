@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -195,7 +194,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     study = _at_point(store, study)
-    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    differing = differing_keys(store.identity, study.identity())
     if differing:
         found = "\n    ".join(["does not match the study that was read for it", *differing])
         raise store_error(store.path, found, "give the study file of the campaign: --study STUDY")

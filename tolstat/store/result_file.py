@@ -45,13 +45,12 @@ class ResultFile(Reader):
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"
         joints = f"{self.n - self.first_sample} joints"
-        progress = [f"{store.point}: " * bool(store.point) + store._progress() for store in self.each()]
+        progress = []
+        for store in self.each():
+            codes, numbers = np.unique(store.status(slice(self.first_sample, None)), return_counts=True)
+            words = ", ".join(f"{n} {Status(code).label}" for code, n in zip(codes.tolist(), numbers, strict=True))
+            progress.append(f"{store.point}: {words}" if store.point else words)
         return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
-
-    def _progress(self) -> str:
-        """Numbers of joints by status, the nominal joint not counted."""
-        codes, numbers = np.unique(self.status(slice(self.first_sample, None)), return_counts=True)
-        return ", ".join(f"{n} {Status(code).label}" for code, n in zip(codes.tolist(), numbers, strict=True))
 
     def view(self, study_path: Path | None = None) -> View:
         """View of the file that questions read, while the file is open.

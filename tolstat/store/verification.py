@@ -84,6 +84,11 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 
+def read_each(stores: Sequence[Reader], name: str) -> list[Verification]:
+    """Verifications of a group at those of the operating points that have one."""
+    return [found for store in stores if (found := read(store, name)) is not None]
+
+
 def _checksum(group: h5py.Group) -> str:
     """SHA-256 of the rows of a verification and of the results of its checks, names and descriptions included."""
     digest = hashlib.sha256(np.asarray(group["rows"][:]).tobytes())

@@ -116,8 +116,8 @@ class View:
 
     def _verified(self, group: str) -> Verification | None:
         """Verifications of all operating points; None if one of them has none."""
-        verifications = [each for part in self.parts if (each := verification.read(part.store, group)) is not None]
-        return verification.together(verifications) if len(verifications) == len(self.parts) else None
+        found = verification.read_each([part.store for part in self.parts], group)
+        return verification.together(found) if len(found) == len(self.parts) else None
 
     @cached_property
     def altered(self) -> dict[str, Altered]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, input_error
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.joint import derived
@@ -78,7 +79,7 @@ def given(study: Study) -> tuple[str, ...]:
     A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
     """
     replaced = {entry.name for entry in study.assumed}
-    keys = _given_keys(study)
+    keys = derived.changed(leaves(_keys_of_study(study)).keys(), leaves(study.joint.given("json")))
     return tuple(
         entry.name
         for entry in study.joint.assumed
@@ -118,6 +119,14 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     changed = replace(study, joint=joint, tolerances=study.tolerances | of_entries(study, keys))
     changed.check_mounting()
     return changed
+
+
+def is_drawn(study: Study, keys: Mapping[str, Any]) -> bool:
+    """Whether the joint of a study has these values already: as a variation they would tell nothing."""
+    with suppress(InputError):
+        same = with_value(study, keys).joint.model_dump() == study.joint.model_dump()
+        return same and _of_joint(study, keys) == keys
+    return False
 
 
 def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -198,12 +207,6 @@ def _keys_of_study(study: Study) -> dict[str, Any]:
     return keys if study.fit is None else merged(keys, {"contact": study.fit.diameters})
 
 
-def _given_keys(study: Study) -> set[str]:
-    """Dotted keys of the joint that a study sets, or that follow from these."""
-    values = leaves(_keys_of_study(study))
-    return derived.changed(values.keys(), leaves(study.joint.given("json")))
-
-
 WIDE = 10.0
 """Standard deviation of an error of position over the radial clearance, at which nearly every pin binds."""
 LEAST_CLEARANCE = 1e-5
@@ -234,13 +237,10 @@ def _wide_bands(study: Study) -> Iterator[Fault]:
         ratio = max(sizes, default=0.0) / max(contact.clearance, LEAST_CLEARANCE)
         if ratio > WIDE:
             room = units.shown(contact.clearance, "m")
-            found = (
-                f"moves the end of a pin by {units.shown(max(sizes), 'm')} (standard deviation), {ratio:.0f} times the "
-                f"radial clearance of {room}: nearly every pin binds"
-            )
-            yield study.fault(
-                f"tolerances.{entry.pattern}", found, "check its unit, and contact.clearance of the joint"
-            )
+            found = f"moves the end of a pin by {units.shown(max(sizes), 'm')} (standard deviation), {ratio:.0f} times "
+            found += f"the radial clearance of {room}: nearly every pin binds"
+            remedy = "check its unit, and contact.clearance of the joint"
+            yield study.fault(f"tolerances.{entry.pattern}", found, remedy)
 
 
 def _fast_points(study: Study) -> Iterator[Fault]:
@@ -250,9 +250,7 @@ def _fast_points(study: Study) -> Iterator[Fault]:
         product = abs(rpm) * alpha
         if product > FAST * (1.0 + ROUNDING):
             at = f" at {point.name}" if point.name else ""
-            found = (
-                f"{rpm:.4g} rpm at {alpha:.3g} deg{at}: speed times angle, {product:.0f} rpm deg, is beyond the "
-                f"{FAST:g} that makers of joint shafts allow"
-            )
+            found = f"{rpm:.4g} rpm at {alpha:.3g} deg{at}: speed times angle, {product:.0f} rpm deg, is beyond the "
+            found += f"{FAST:g} that makers of joint shafts allow"
             key = f"operation[{number}].speed" if point.name else "operation.speed"
             yield study.fault(key, found, "check it and alpha, and their units")

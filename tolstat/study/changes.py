@@ -174,30 +174,18 @@ def differing(study: Study, changed: Study) -> dict[str, Any]:
     Numbers have `DIGITS` significant digits, so that values that differ in their unit only are the same.
     """
     texts = (json.dumps(widths.applied(each, {}).identity()) for each in (study, changed))
-    old, new = (json.loads(NUMBER.sub(_rounded, text)) for text in texts)
+    rounded = (NUMBER.sub(lambda number: str(float(f"{float(number[0]):.{DIGITS}g}")), text) for text in texts)
+    old, new = map(json.loads, rounded)
     keys = sorted(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
     return {key: new.get(key) for key in keys if not key.startswith("sampling.")}
 
 
-def _rounded(number: re.Match[str]) -> str:
-    return str(float(f"{float(number[0]):.{DIGITS}g}"))
-
-
 def _parsed(setting: str, place: str) -> tuple[list[str], Any]:
     """Parts of the key of a setting, without ``tolerances``, and its value."""
-    name, equals, value = setting.partition("=")
-    path = [part.strip() for part in name.split(".")]
-    if not (equals and value.strip() and all(path)) or (len(path) < NAMES and path[0] not in SECTIONS):
-        raise input_error(place, "is not a setting", EXAMPLE)
-    if path[0] == "tolerances":
-        path = path[1:]
-    elif path[0] in SECTIONS and path[0] not in SETTABLE:
+    path, value = rewriting.parsed(setting, place, EXAMPLE)
+    if path[0] in SECTIONS and path[0] not in (*SETTABLE, "tolerances"):
         raise input_error(place, f"is in section {path[0]!r}, which changes no joint", OTHERS)
-    elif len(path) < NAMES:
-        raise input_error(place, "is not a setting", EXAMPLE)
-    if not path:
-        raise input_error(place, "is not a setting", EXAMPLE)
-    return path, rewriting.given(value)
+    return path[1:] if path[0] == "tolerances" else path, value
 
 
 def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
@@ -224,6 +212,7 @@ class _Entries:
 
     def __init__(self, study: Study) -> None:
         self._study = study
+        self._written = {entry.pattern: dict(entry.keys) for entry in study.entries}
         self._patterns = {entry.pattern: [site.name for site, _ in entry.models] for entry in study.entries}
         self._keys = {site.name: dict(entry.keys) for entry in study.entries for site, _ in entry.models}
         self._touched: set[str] = set()
@@ -267,7 +256,7 @@ class _Entries:
             if self._touched & set(names):
                 each = [self._keys.get(name) for name in names]
                 is_alike = each[0] is not None and all(other == each[0] for other in each)
-                alike[pattern] = dict(each[0] or {}) if is_alike else _keys_of(self._study, pattern)
+                alike[pattern] = dict(each[0] or {}) if is_alike else self._written[pattern]
                 parted += [] if is_alike else [pattern]
         if alike.keys() & {fits.HOLE, fits.PIN} and _fit(text) != _fit(self._study.text):
             raise input_error("--set fit", "is given beside tolerances of diameters", "leave one of the two out")
@@ -286,10 +275,6 @@ class _Entries:
 
 def _fit(text: str) -> Any:
     return tomllib.loads(text)["tolerances"].get(fits.KEY)
-
-
-def _keys_of(study: Study, pattern: str) -> dict[str, Any]:
-    return next(dict(entry.keys) for entry in study.entries if entry.pattern == pattern)
 
 
 def _with_key(entry: Mapping[str, Any], path: Sequence[str], value: Any) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
@@ -22,10 +22,20 @@ from tolstat.common.files import finite, read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.entry import Positive
+from tolstat.study.tolerances.entry import OF_ERROR
 
 REACH = (0.1, 4.0)
 """Smallest and largest factor on a tolerance that are considered."""
+
+
+def _width(value: object, info: ValidationInfo) -> float:
+    """Read a width of the tolerance that the entry is for, with the sign that it has on a drawing, or without."""
+    tolerance: Tolerance = (info.context or {})["tolerance"]
+    return units.to_si(value, tolerance.site.unit, tolerance.mark)
+
+
+Width = Annotated[float, BeforeValidator(_width), AfterValidator(units.positive), OF_ERROR]
+"""Width of a tolerance: half the band, but the whole zone."""
 
 
 class CostEntry(Strict):
@@ -35,13 +45,13 @@ class CostEntry(Strict):
     """cost of the tolerance `at`, in any currency"""
     fixed: Annotated[units.Number, Field(ge=0)] = Field(default=0.0, examples=[1.0])
     """part of it that does not depend on the tolerance"""
-    at: Positive | None = Field(default=None, examples=["0.5 deg"])
-    """tolerance (half the band) that costs `cost`; that of the study by default"""
+    at: Width | None = Field(default=None, examples=["0.5 deg"])
+    """tolerance (half the band, but the whole zone) that costs `cost`; that of the study by default"""
     power: Annotated[units.Number, Field(gt=0, le=10)] = Field(default=1.0, examples=[2.0])
     """exponent of the reciprocal"""
-    least: Positive | None = Field(default=None, examples=["0.1 deg"])
+    least: Width | None = Field(default=None, examples=["0.1 deg"])
     """smallest tolerance that the process can hold"""
-    most: Positive | None = Field(default=None, examples=["0.030 mm"])
+    most: Width | None = Field(default=None, examples=["0.030 mm"])
     """largest tolerance that the function allows"""
     keep: bool = Field(default=False, strict=True, examples=[True])
     """whether the tolerance stays as it is"""
@@ -123,16 +133,16 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     if path is None:
         return [Cost(t.width, dict.fromkeys(features(t), CostEntry())) for t in tolerances]
     table = _read_csv(path) if path.suffix == ".csv" else strict.read_toml(path)
-    units_of = {name: t.site for t in tolerances for name in t.names}
+    tolerance_of = {name: tolerance for tolerance in tolerances for name in tolerance.names}
     costs: dict[str, CostEntry] = {}
     faults: list[Fault] = []
     claims = selection.Assignments(str(path))
-    known = {name: site.unit for name, site in units_of.items()}
+    known = {name: tolerance.site.unit for name, tolerance in tolerance_of.items()}
     for entry in selection.entries(table):
         with gather(faults):
             names = selection.resolve(entry, known, str(path))
             claims.claim(entry, names)
-            context = {"site": units_of[names[0]]}
+            context = {"tolerance": tolerance_of[names[0]]}
             cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
             costs |= dict.fromkeys(names, cost)
     if faults:

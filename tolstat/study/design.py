@@ -67,13 +67,11 @@ class Design:
             "case": self.cases,
             "variants": families,
             "variant": {
-                f"{number} {variant.family}": variant.values | {"cases": self._run(number)}
+                f"{number} {variant.family}": variant.values
+                | {"cases": np.unique(self.table["case"][self.table["variant"] == number]).tolist()}
                 for number, variant in enumerate(self.variants)
             },
         }
-
-    def _run(self, variant: int) -> list[int]:
-        return [int(case) for case in np.unique(self.table["case"][self.table["variant"] == variant])]
 
 
 def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:

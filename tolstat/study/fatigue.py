@@ -308,10 +308,9 @@ def read(file: Reading) -> Fatigue:
     points = []
     for name, point in settings.point.items():
         bushings = select(point.bushing, BUSHINGS)
-        names_of_points = [name] if len(bushings) == 1 else [f"{name}, {bushing}" for bushing in bushings]
-        points += [
-            StressPoint(*each, point.per_load, point.line) for each in zip(names_of_points, bushings, strict=True)
-        ]
+        for bushing in bushings:
+            own = name if len(bushings) == 1 else f"{name}, {bushing}"
+            points.append(StressPoint(own, bushing, point.per_load, point.line))
     given = settings.model_dump(include={"revolutions", "reference_cycles", "starts"}, exclude_none=True)
     return Fatigue(
         tuple(settings.exponents),
@@ -332,9 +331,8 @@ def _check_visits(file: Reading, visits: Sequence[str], sequence: SequenceEntry 
         return
     for point, turns in zip(points, sequence.revolutions * rates / (rates.sum() or 1.0), strict=True):
         if (visited := visits.count(point.name)) > 1.001 * turns:
-            found = (
-                f"{visited} visits of {point.name} in {turns:.3g} revolutions, its share of {sequence.revolutions:g}"
-            )
+            share = f"its share of {sequence.revolutions:g}"
+            found = f"{visited} visits of {point.name} in {turns:.3g} revolutions, {share}"
             remedy = "a visit is at least one revolution: give more of them, or fewer visits"
             file.fault("fatigue.sequence.revolutions", found, remedy)
 

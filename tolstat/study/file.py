@@ -24,8 +24,9 @@ from tolstat.joint.reading import faults_of_assumed
 from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
+from tolstat.study.points import Point
 from tolstat.study.selection import TOLERANCED, Assignments, Reading
-from tolstat.study.study import Case, Study
+from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
@@ -41,10 +42,7 @@ BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
 SCATTER = ("tolerances", "correlation", "errors")
 """Sections that define the joints of most sampling methods; the first is required."""
-SECTIONS_OF = {
-    "sweep": ("sweep", "errors"),
-    "cases": ("case", "grid", "variant"),
-}
+SECTIONS_OF = {"sweep": ("sweep", "errors"), "cases": ("case", "grid", "variant")}
 """Sections that define the joints of the other sampling methods; the first is required."""
 
 
@@ -286,8 +284,8 @@ def _read(file: Reading, names: Iterable[str]) -> None:
                 file.parts[name] = READERS[name](file)
 
 
-def load_case(path: str | Path) -> Case:
-    """Read a case file: one joint with its errors.
+def load_case(path: str | Path) -> Study:
+    """Read a case file: one joint with its errors, a study whose only joint has its fixed errors.
 
     Raises
     ------
@@ -306,7 +304,8 @@ def load_case(path: str | Path) -> Case:
         file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
     if None in (file.joint, file.operation, file.solver, file.errors):
         file.finish()
-    case = Case(file.path, file.text, file.joint, file.operation, file.solver, file.errors)
+    one, parts = Sampling(method="cases"), (file.joint, file.operation, file.solver, file.errors)
+    case = Study(file.path, file.text, *parts, one, Output(), (Point("", file.operation, 1.0),))
     with gather(file.faults):
         case.check_mounting()
     file.finish()

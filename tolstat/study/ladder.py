@@ -119,9 +119,8 @@ def _rungs(tolerance: Tolerance, reach: float, side: int) -> Iterator[Rung]:
         entry = tolerance.entry | {"iso2768": grade}
         factor = scaling.width(entry, tolerance.site) / tolerance.width
         if factor != 1.0 and side * factor <= side * reach:
-            yield Rung(
-                f"class {grade} ({_words(tolerance, factor * tolerance.width)})", (factor,), {tolerance.pattern: entry}
-            )
+            words = f"class {grade} ({_words(tolerance, factor * tolerance.width)})"
+            yield Rung(words, (factor,), {tolerance.pattern: entry})
     # a band between two limits is written by its whole width
     whole = 2.0 if "lower" in tolerance.entry else 1.0
     scale = whole * tolerance.width * DISPLAY_UNITS.get(tolerance.site.unit, ("", 1.0))[1]
@@ -135,8 +134,8 @@ def preferred(value: float, side: int) -> float:
     decade = math.floor(math.log10(value))
     numbers = [number * 10.0**k for k in (decade - 1, decade, decade + 1) for number in R10]
     if side > 0:
-        return min(number for number in numbers if number >= LEAST_STEP * value)
-    return max(number for number in numbers if number <= value / LEAST_STEP)
+        return next(number for number in numbers if number >= LEAST_STEP * value)
+    return next(number for number in reversed(numbers) if number <= value / LEAST_STEP)
 
 
 def _words(tolerance: Tolerance, width: float) -> str:
@@ -161,10 +160,8 @@ def _of_fit(study: Study, both: Sequence[tuple[Tolerance, Cost]]) -> Ladder:
                 zones = iso.zones(code, entry.size)
             except ValueError:  # the tables end here
                 return
-            of = {
-                fits.HOLE: zones.hole.half / entry.zones.hole.half,
-                fits.PIN: zones.shaft.half / entry.zones.shaft.half,
-            }
+            halves = (new.half / old.half for new, old in zip(zones, entry.zones, strict=True))
+            of = dict(zip((fits.HOLE, fits.PIN), halves, strict=True))
             factors = tuple(of[t.pattern] for t in tolerances)
             reached = all(c.reach[0] <= f <= c.reach[1] for c, f in zip(costs, factors, strict=True))
             if zones.least < 0.0 or not reached:

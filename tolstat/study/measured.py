@@ -1,8 +1,8 @@
 """Tolerances known from measured parts: what the parts leave open of a process, as values that are assumed.
 
 Spread and mean of an entry have the values at both ends of their intervals, of a lognormal law those of the logarithm.
-Their keys stand beside those of the joint: ``pin*.tilt_[tz].spread``, the pattern of the entry and a field of
-`analysis.measured.Process`.
+Their keys stand beside those of the joint: ``pin*.tilt_[tz].spread`` and ``.mean``, the pattern of the entry before the
+dot; for values see `analysis.measured`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tolstat.analysis.measured import Process, means, spreads
+from tolstat.analysis.measured import means, spreads
 from tolstat.study.study import Study
 from tolstat.study.tolerances.distributions import Distribution, LogNormal, Normal
 from tolstat.study.tolerances.entry import Toleranced
@@ -43,15 +43,15 @@ def of_entries(study: Study, keys: Mapping[str, Any]) -> dict[str, Distribution]
     for entry in study.known:
         values = {key.rpartition(".")[2]: keys[key] for key in left_open(entry) if key in keys}
         if values:
-            changed |= {name: _of(study.tolerances[name], Process(**values)) for name in entry.names}
+            changed |= {name: _of(study.tolerances[name], **values) for name in entry.names}
     return changed
 
 
-def _of(law: Distribution, process: Process) -> Distribution:
+def _of(law: Distribution, spread: float = 1.0, mean: float = 0.0) -> Distribution:
     """Distribution of parts with another spread and mean."""
     if isinstance(law, Accepted):
-        return replace(law, every=_of(law.every, process))
+        return replace(law, every=_of(law.every, spread, mean))
     normal = law.log if isinstance(law, LogNormal) else law
     assert isinstance(normal, Normal)  # no other law has `measured_parts`
-    changed = Normal(normal.mean + process.mean * normal.sigma, process.spread * normal.sigma)
+    changed = Normal(normal.mean + mean * normal.sigma, spread * normal.sigma)
     return replace(law, log=changed) if isinstance(law, LogNormal) else changed

@@ -62,9 +62,8 @@ class Solver(Strict):
     def _auto(self) -> Self:
         auto = self.fidelity == "auto"
         if not auto and "error_budget" in self.model_fields_set:
-            raise refuse(
-                f"error_budget is given with fidelity {self.fidelity!r}", 'remove it, or write fidelity = "auto"'
-            )
+            found = f"error_budget is given with fidelity {self.fidelity!r}"
+            raise refuse(found, 'remove it, or write fidelity = "auto"')
         if auto and "steps_per_rev" in self.model_fields_set:
             raise refuse("steps_per_rev is given with fidelity 'auto'", "remove it: auto chooses it")
         return self
@@ -105,11 +104,8 @@ class Sampling(Strict):
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `replicates` of one, and `joints_per_lot` of one: they have no effect."""
-        has_effect = {
-            "replicates": self.replicates > 1,
-            "joints_per_lot": self.joints_per_lot > 1,
-        }
-        return {key: value for key, value in write(self).items() if has_effect.get(key, True)}
+        optional = ("replicates", "joints_per_lot")
+        return {key: value for key, value in write(self).items() if key not in optional or value > 1}
 
     @model_validator(mode="before")
     @classmethod
@@ -138,9 +134,8 @@ class Sampling(Strict):
             found = f"{self.n} joints, {self.joints_per_lot} a lot, are fewer than {LEAST} lots"
             raise refuse(found, f"give n = {least} or more, or a smaller joints_per_lot")
         if self.method == "cases" and self.nominal_first:
-            raise refuse(
-                "nominal_first is given with 'cases'", "remove it: each group has its own joint without errors"
-            )
+            remedy = "remove it: each group has its own joint without errors"
+            raise refuse("nominal_first is given with 'cases'", remedy)
         return self
 
     @property

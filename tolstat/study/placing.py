@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
 from tolstat.common.errors import InputError
+from tolstat.common.toml_lines import KeyPath, paths
 from tolstat.joint import reading
 from tolstat.study import rewriting
 from tolstat.study.study import Study
-
-Keys = tuple[int | str, ...]
 
 
 def placed(text: str, source: Path, target: Path) -> str:
@@ -37,7 +38,7 @@ def placed(text: str, source: Path, target: Path) -> str:
     InputError
         See `rewriting.with_keys`.
     """
-    changes: dict[Keys, dict[str, Any]] = {}
+    changes: dict[KeyPath, dict[str, Any]] = {}
     for path, name in _files(tomllib.loads(text)):
         if not Path(name).is_absolute():
             changes.setdefault(path[:-1], {})[str(path[-1])] = _between(source.parent / name, target.parent)
@@ -69,23 +70,12 @@ def _between(path: Path, folder: Path) -> str:
         return path.absolute().as_posix()
 
 
-def _files(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+def _files(data: Any) -> Iterator[tuple[KeyPath, str]]:
     """Key path and name of each file that a study names: of joints, measured parts and measured signals."""
-    for path, value in _leaves(data, ()):
-        is_joint = path[-1] == "base" and path[-2:-1] == ("joint",) and isinstance(value, str)
-        named = is_joint and (value.endswith(".toml") or len(Path(value).parts) > 1)
-        if named or (path[-1] == "file" and isinstance(value, str)):
+    for path in paths(data):
+        value = reduce(getitem, path, data)
+        if not isinstance(value, str):
+            continue
+        is_path = value.endswith(".toml") or len(Path(value).parts) > 1
+        if path[-1] == "file" or (path[-2:] == ("joint", "base") and is_path):
             yield path, value
-
-
-def _leaves(value: Any, path: Keys) -> Iterator[tuple[Keys, Any]]:
-    """Key path and value of all that is no table."""
-    if isinstance(value, Mapping):
-        items: Any = value.items()
-    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
-        items = enumerate(value)
-    else:
-        yield path, value
-        return
-    for key, inner in items:
-        yield from _leaves(inner, (*path, key))

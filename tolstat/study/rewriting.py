@@ -40,14 +40,11 @@ def with_settings(text: str, settings: Sequence[str]) -> str:
     """
     for setting in settings:
         place = f"--set {setting!r}"
-        name, equals, value = setting.partition("=")
-        section, *path = (part.strip() for part in name.split("."))
-        if not (equals and value.strip() and path and all(path)):
-            raise input_error(place, "is not a setting", "write --set joint.shaft.axial=free")
-        if section not in SETTABLE:
+        path, value = parsed(setting, place, "write --set joint.shaft.axial=free")
+        if path[0] not in SETTABLE:
             allowed = f"set keys of {', '.join(SETTABLE)}; edit the study for others"
-            raise input_error(place, f"is in section {section!r}", allowed)
-        text = with_path(text, [section, *path], given(value), place)
+            raise input_error(place, f"is in section {path[0]!r}", allowed)
+        text = with_path(text, path, value, place)
     return text
 
 
@@ -66,12 +63,22 @@ def as_text(sections: Mapping[str, Any]) -> str:
         raise input_error("study", found, "give texts, numbers, true or false, lists and dictionaries") from error
 
 
-def given(value: str) -> Any:
-    """Value of a setting of the command line: as in TOML; a text may lack its quotes."""
+def parsed(setting: str, place: str, example: str) -> tuple[list[str], Any]:
+    """Key path of a setting of the command line, and its value: as in TOML; a text may lack its quotes.
+
+    Raises
+    ------
+    InputError
+        When it is not a dotted key of a section with a value; `example` is the remedy.
+    """
+    name, _, value = setting.partition("=")
+    path = [part.strip() for part in name.split(".")]
+    if not (value.strip() and all(path) and len(path) > 1):
+        raise input_error(place, "is not a setting", example)
     try:
-        return tomllib.loads(f"value = {value}")["value"]
+        return path, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        return value.strip()
+        return path, value.strip()
 
 
 def with_path(text: str, path: Sequence[str], value: Any, place: str) -> str:

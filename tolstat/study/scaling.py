@@ -12,7 +12,6 @@ from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.study import rewriting
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, kinds
-from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.zones import ZoneEntry
 
@@ -86,16 +85,9 @@ class Tolerance(NamedTuple):
         if (fixed := self.fixed) is not None:
             for key in _PLACES & entry.keys():
                 value = units.to_si(entry[key], self.site.unit)
-                moved = fixed + factor * (value - fixed)
-                entry[key] = (
-                    entry[key] if moved == value else units.written(moved, self.site.unit, entry[key], digits + 1)
-                )
+                if (moved := fixed + factor * (value - fixed)) != value:
+                    entry[key] = units.written(moved, self.site.unit, entry[key], digits + 1)
         return entry
-
-    def distribution(self, entry: Mapping[str, Any]) -> Distribution:
-        """Distribution that `entry` gives each of the quantities."""
-        read = kinds.entry(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
-        return next(iter(read.quantities(self.site).values()))
 
 
 def tolerances(study: Study) -> list[Tolerance]:
@@ -111,9 +103,8 @@ def tolerances(study: Study) -> list[Tolerance]:
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
         if of_parts and not refined and model.scales:
-            scalable.append(
-                Tolerance(entry.pattern, entry.names, dict(entry.keys), site, width(entry.keys, site), mark(model))
-            )
+            size = width(entry.keys, site)
+            scalable.append(Tolerance(entry.pattern, entry.names, dict(entry.keys), site, size, mark(model)))
     return scalable
 
 

@@ -116,9 +116,8 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
         for feature, halves in features.items()
     }
     patterns = {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
-    return _closed(nested, patterns | {rf"^(?:{'|'.join(features)}|{WILD})\.{WILD}{end}$": wild}) | {
-        "description": description
-    }
+    patterns |= {rf"^(?:{'|'.join(features)}|{WILD})\.{WILD}{end}$": wild}
+    return _closed(nested, patterns) | {"description": description}
 
 
 def _closed(properties: Mapping[str, Schema], patterns: Mapping[str, Schema] | None = None) -> Schema:

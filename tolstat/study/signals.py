@@ -6,6 +6,8 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +21,7 @@ from tolstat.common.files import finite
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import dotted, read_text
+from tolstat.common.toml_lines import KeyPath, paths
 from tolstat.display.text import percent
 from tolstat.study import rewriting
 
@@ -275,7 +278,7 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
     notes : tuple of str
         What each signal has, and which share of it does not repeat.
     """
-    changes: dict[tuple[int | str, ...], Mapping[str, Any]] = {}
+    changes: dict[KeyPath, Mapping[str, Any]] = {}
     notes, known = [], dict[tuple[str, str], Orders]()
     none = np.zeros(0)
     stand_in = Orders(1.0, none.astype(int), none, none, math.nan, math.nan, 0)
@@ -300,17 +303,13 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
     return text, tuple(notes)
 
 
-def _files(data: Mapping[str, Any]) -> Iterator[tuple[tuple[int | str, ...], Table]]:
+def _files(data: Any) -> Iterator[tuple[KeyPath, Table]]:
     """Key path and table of each speed or torque that is a file."""
-    section = data.get("operation")
-    each: list[tuple[tuple[int | str, ...], Any]] = [(("operation",), section)]
-    if isinstance(section, list):
-        each = [(("operation", number), point) for number, point in enumerate(section)]
-    for path, point in each:
-        for key in WRITTEN:
-            table = point.get(key) if isinstance(point, Mapping) else None
-            if isinstance(table, dict) and "file" in table:
-                yield (*path, key), table
+    for path in paths({"operation": data.get("operation")}):
+        table = reduce(getitem, path, data)
+        is_of_point = path[-1] in WRITTEN and all(isinstance(part, int) for part in path[1:-1])
+        if is_of_point and isinstance(table, dict) and "file" in table:
+            yield path, table
 
 
 def _written(key: str, measured: Orders) -> Table:

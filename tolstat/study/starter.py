@@ -49,18 +49,16 @@ def write(path: Path, joint: str) -> list[Path]:
     if joint not in (*names, OWN):
         raise input_error("--joint", f"no joint is named {joint!r}", strict.did_you_mean(joint, [*names, OWN]))
     files = dict(_files(path, joint))
-    raise_all(
-        Fault(str(file), "exists", "give the study another name") for file in files if file.exists() and not _made(file)
-    )
+    taken = [file for file in files if file.exists() and not _made(file)]
+    raise_all(Fault(str(file), "exists", "give the study another name") for file in taken)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for file, text in files.items():
             with atomic_write(file) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise input_error(
-            path, f"cannot be written: {error.strerror or error}", "give a folder that is writable"
-        ) from error
+        found = f"cannot be written: {error.strerror or error}"
+        raise input_error(path, found, "give a folder that is writable") from error
     return list(files)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -33,8 +34,8 @@ from tolstat.study.tolerances.fits import Fit
 
 
 @dataclass(frozen=True, repr=False)
-class Case:
-    """One joint to be simulated.
+class Study:
+    """A campaign: its joints, the distribution of their errors, limits, and what is stored; or a case of one joint.
 
     Attributes
     ----------
@@ -45,76 +46,13 @@ class Case:
     joint : Joint
         Nominal joint.
     operation : Operation
-        Operating point.
+        Operating point; of several the first, see `at`.
     solver : Solver
         Numerical settings.
     errors : dict
-        Error name to deviation (SI).
-    """
-
-    path: Path
-    text: str
-    joint: Joint
-    operation: Operation
-    solver: Solver
-    errors: dict[str, float]
-
-    @property
-    def name(self) -> str:
-        """Name of the file without folder and ending."""
-        return self.path.stem
-
-    def fault(self, key: str, found: str, remedy: str) -> Fault:
-        """Fault of a key of the file, with its line."""
-        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
-        return lined
-
-    def check_mounting(self) -> None:
-        """Refuse settings without effect, see `points.refusals`.
-
-        Raises
-        ------
-        InputError
-            With every such setting.
-        """
-        raise_all([self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)])
-
-    @property
-    def _settings(self) -> list[Setting]:
-        return [Setting(("operation",), self.joint, self.operation, self.solver.fidelity)]
-
-    @property
-    def _varied(self) -> dict[str, list[str]]:
-        return {}
-
-    def __repr__(self) -> str:
-        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
-        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
-
-    def _repr_html_(self) -> str:
-        rows = (f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in self._entries())
-        return f"<table><caption>{escape(repr(self)[1:-1])}</caption>{''.join(rows)}</table>"
-
-    def _entries(self) -> list[tuple[str, object]]:
-        """Named values that a notebook shows."""
-        solver, turned = self.solver, Point("", self.operation).in_words
-        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
-        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
-        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
-
-
-@dataclass(frozen=True, repr=False)
-class Study(Case):
-    """A campaign: its joints, the distribution of their errors, limits, and what is stored.
-
-    Attributes
-    ----------
-    operation : Operation
-        Operating point; of several the first, see `at`.
+        Fixed errors of every joint except the nominal one (SI).
     points : tuple of Point
         All operating points; the same joints are simulated at each.
-    errors : dict
-        Fixed errors of every joint except the nominal one (SI).
     tolerances : dict
         Name to distribution of each quantity that is drawn: an error; or a vector of a zone, such as
         ``pin1.position_inner``, with the distribution of its radius.
@@ -149,6 +87,12 @@ class Study(Case):
         Notes on the measured signals that speed or torque follow from, see `signals.replaced`.
     """
 
+    path: Path
+    text: str
+    joint: Joint
+    operation: Operation
+    solver: Solver
+    errors: dict[str, float]
     sampling: Sampling
     output: Output
     points: tuple[Point, ...]
@@ -165,6 +109,26 @@ class Study(Case):
     fit: Fit | None = None
     assumed: tuple[Assumed, ...] = ()
     signals: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the file without folder and ending."""
+        return self.path.stem
+
+    def fault(self, key: str, found: str, remedy: str) -> Fault:
+        """Fault of a key of the file, with its line."""
+        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
+        return lined
+
+    def check_mounting(self) -> None:
+        """Refuse settings without effect, see `points.refusals`.
+
+        Raises
+        ------
+        InputError
+            With every such setting.
+        """
+        raise_all([self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)])
 
     @property
     def known(self) -> tuple[Toleranced, ...]:
@@ -199,12 +163,8 @@ class Study(Case):
         """Errors of the operating point that scatter or are swept, to the sections in which they do."""
         grid = {name for point in self.listed.points for name in point} if self.listed else set()
         names = {"tolerances": self.tolerances, "sweep": [n for axis in self.sweep for n in axis.names], "grid": grid}
-        sections: dict[str, list[str]] = {}
-        for section, of_section in names.items():
-            for name in of_section:
-                if name.startswith("operation."):
-                    sections.setdefault(name, []).append(section)
-        return sections
+        varied = [name for section in names.values() for name in section if name.startswith("operation.")]
+        return {name: [section for section in names if name in names[section]] for name in varied}
 
     @property
     def _different(self) -> Design | None:
@@ -294,12 +254,19 @@ class Study(Case):
             parts.append(f"{len(self.points)} operating points")
         return f"<study {self.name!r}: {', '.join(parts)}>"
 
-    def _entries(self) -> list[tuple[str, object]]:
-        sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
-        toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
-        named = [(f"operation {point.name}", point.in_words) for point in self.points if point.name]
-        entries = [entry for entry in super()._entries() if not named or entry[0] != "operation"]
-        return [*entries, *named, ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
+    def _repr_html_(self) -> str:
+        solver, sampling = self.solver, self.sampling
+        entries = {
+            "file": str(self.path),
+            **{f"operation {point.name}".rstrip(): point.in_words for point in self.points},
+            "solver": f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution",
+            "fixed errors, SI": ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none",
+            "sampling": f"{sampling.method}, {self.samples} joints, seed {sampling.seed}",
+            "toleranced": ", ".join(self.tolerances) or "none",
+            "limits": limits_in_words(self.limits),
+        }
+        rows = (f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in entries.items())
+        return f"<table><caption>{escape(repr(self)[1:-1])}</caption>{''.join(rows)}</table>"
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
@@ -325,4 +292,5 @@ class Study(Case):
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],
         }
         parts |= {name: part for name, part in optional.items() if part}
-        return leaves(parts | (self.listed.identity() if self.listed else {}))
+        identity: dict[str, Any] = leaves(parts | (self.listed.identity() if self.listed else {}))
+        return dict(json.loads(json.dumps(identity)))

@@ -88,12 +88,11 @@ def label(study: Study, entry: Toleranced) -> str:
 
 def features(study: Study) -> list[Group]:
     """Each pin with its hole: all that is drawn of the two."""
-    pairs = [(pin, hole, f"{pin} and {hole}") for pin, hole in HOLE_OF_PIN.items()]
-    return [
-        Group(label, names)
-        for pin, hole, label in pairs
-        if (names := tuple(n for n in _drawn(study) if n.partition(".")[0] in (pin, hole)))
+    groups = [
+        Group(f"{pin} and {hole}", tuple(name for name in _drawn(study) if name.partition(".")[0] in (pin, hole)))
+        for pin, hole in HOLE_OF_PIN.items()
     ]
+    return [group for group in groups if group.names]
 
 
 def errors(study: Study) -> list[Group]:

@@ -12,6 +12,8 @@ from scipy.special import ndtr
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, laws, sample_of
 from tolstat.analysis import difference
 from tolstat.common.loads import FloatArray
+from tolstat.questions import change
+from tolstat.questions.shares import ChangedJoints
 
 SKEW = "means of skew loads: Student's interval is symmetric"
 
@@ -60,6 +62,11 @@ def experiments() -> Iterator[Experiment]:
     for rho in (0.9, 0.99):
         for two in sides(rho):
             yield _with_lost(two, 1024)
+    normal = laws()["normal"]
+    little = Two("normal, moved by 0.02", normal, lambda a: a + 0.02, lambda b: b - 0.02, 0.99)
+    none = Two("normal, not moved", normal, lambda a: a, lambda b: b, 0.99)
+    for two in (*sides(0.99), little, none):
+        yield _at_a_stop(two)
 
 
 def _compared(two: Two, n: int, paired: bool) -> Experiment:
@@ -98,3 +105,28 @@ def _with_lost(two: Two, n: int) -> Experiment:
 
     case = f"{two.name}, pairs correlated by {two.rho:g}, some lost"
     return Experiment((Asked("change of a share, what if", case, n),), once)
+
+
+class _Joints(ChangedJoints):
+    """Loads as drawn, and a level, without a campaign."""
+
+    def __init__(self, base: FloatArray, level: float) -> None:
+        self.base, self.level = base, level
+
+
+def _at_a_stop(two: Two) -> Experiment:
+    """A change, with twice as many joints until it is settled: the interval that is shown then."""
+    level = float(two.law.ppf(0.95))
+    truth = two.share_of_b(level) - 0.05
+    confidence = 1.0 - 0.05 / (1 + np.log2(change.MOST / change.FIRST))
+
+    def once(rng: Rng) -> list[Found]:
+        a, b = two.draw(rng, change.MOST)
+        joints, n = _Joints(a, level), change.FIRST
+        while n < change.MOST and not change._is_settled(joints, b[:n], np.nan, confidence):
+            n *= 2
+        _, low, high = joints.difference(a, b[:n])
+        return [Found(low, high, truth)]
+
+    case = f"{two.name}, pairs correlated by {two.rho:g}"
+    return Experiment((Asked("change of a share, at a stop", case, change.MOST),), once)

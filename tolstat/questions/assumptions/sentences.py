@@ -120,7 +120,9 @@ def not_varied(standing: Standing | None, file: str) -> str:
     """Words on assumptions that the file has no joints of, with the command that simulates them."""
     if standing is None or not standing.missing:
         return ""
-    return f"{_listed(standing.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
+    missing = standing.missing
+    what = _listed(missing) if len(missing) <= _NAMED else f"{len(missing)} assumptions"
+    return f"{what} not varied: tolstat assumptions {file} --run"
 
 
 def still(standing: Standing) -> str:
@@ -129,6 +131,9 @@ def still(standing: Standing) -> str:
     if standing.still:
         parts.append(f"Moves nothing that {standing.n} joints show: {', '.join(standing.still)}.")
     parts += [f"Not varied: {assumption.name} ({assumption.because})." for assumption in standing.fixed]
+    if standing.without_other:
+        names = _listed(standing.without_other)
+        parts.append(f"{text.capital(names)}: only as drawn is listed; give other values in [[assumed]].")
     if standing.given:
         parts.append(f"Given by the study: {_listed(standing.given)}.")
     return " ".join(parts)

@@ -19,7 +19,7 @@ from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
-from tolstat.study.assumptions import Assumption, assumptions, given, together
+from tolstat.study.assumptions import Assumption, assumptions, given, is_drawn, together
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -91,6 +91,8 @@ class Standing:
         Assumptions that are not varied.
     given : tuple of str
         Names of assumptions of the joint file that the study gives.
+    without_other : tuple of str
+        Names of assumptions of which only the values as drawn are listed.
     """
 
     n: int
@@ -103,6 +105,7 @@ class Standing:
     missing: tuple[str, ...]
     fixed: tuple[Assumption, ...]
     given: tuple[str, ...] = ()
+    without_other: tuple[str, ...] = ()
 
     @property
     def turning(self) -> list[Row]:
@@ -177,8 +180,10 @@ def _evaluate(view: View, accepted: float) -> Standing:
     names = tuple(dict.fromkeys(variation.name for variation, _ in simulated))
     rows.sort(key=lambda row: -abs(np.nan_to_num(row["change"])))
     fixed = tuple(assumption for assumption in assumptions(study) if not assumption.varied)
+    others = {variation.name for variation in singles(study)}
+    drawn_only = tuple(each.name for each in assumptions(study) if each.varied and each.name not in others)
     n = min((len(loads) for _, loads in simulated), default=0)
-    return Standing(n, confidence, accepted, drawn, side, rows, names, missing, fixed, given(study))
+    return Standing(n, confidence, accepted, drawn, side, rows, names, missing, fixed, given(study), drawn_only)
 
 
 def applicable(view: View, accepted: float = np.nan) -> Standing | None:
@@ -233,12 +238,13 @@ def all_together(view: View) -> list[Variation]:
 
 
 def singles(study: Study) -> list[Variation]:
-    """Variations of one assumption each: every value of those that are varied."""
+    """Variations of one assumption each: every value of those that are varied, except the values as drawn."""
     return [
         Variation(assumption.name, label_of(assumption.name, keys), keys, assumption.because)
         for assumption in assumptions(study)
         if assumption.varied
         for keys in assumption.values
+        if not is_drawn(study, keys)
     ]
 
 

@@ -110,7 +110,7 @@ def read(file: Reading) -> Copula:
     with gather(file.faults):
         if len(file.faults) == before:
             copula = correlated(_positive_definite(tuple(order), rho, file.place), lots, file.place)
-            for name in sorted(file.scatter.accepted & set(copula.names)):
+            for name in sorted({bonus.diameter for bonus in file.scatter.rejecting}.intersection(copula.names)):
                 found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
                 remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
                 file.fault("correlation", found, remedy)

@@ -168,9 +168,8 @@ def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
     names = [key for key, _ in pairs]
     if len(by_position) > len(allowed) or len(set(names)) < len(names) or not set(shapes) <= set(names) <= set(allowed):
         raise refuse(f"{text!r} does not give each parameter once", f"{name} has {', '.join(allowed)}")
-    return name, tuple(
-        (str(key), float(value)) for key, value in sorted(pairs, key=lambda pair: allowed.index(pair[0]))
-    )
+    values = dict(pairs)
+    return name, tuple((key, float(values[key])) for key in allowed if key in values)
 
 
 RARE = 0.005
@@ -258,9 +257,8 @@ def _read(path: Path, column: str) -> list[float]:
         raise refuse(f"{path} {found}", remedy) from error
     except (OSError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise refuse(
-            f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
-        ) from error
+        remedy = "give a CSV file; its path starts from the study's folder"
+        raise refuse(f"{path} cannot be read: {reason}", remedy) from error
     if column not in columns:
         raise refuse(f"{path} has no column {column!r}", strict.did_you_mean(column, list(columns)))
     values = list(map(finite, cells))

@@ -113,9 +113,8 @@ class Fit(NamedTuple):
     def diameters(self) -> dict[str, str]:
         """Nominal diameters, as keys of ``joint.contact``."""
         middles = (zone.middle for zone in self.entry.zones)
-        return {
-            key: _written(1e6 * self.entry.basic + middle) for key, middle in zip(("D_H", "D_P"), middles, strict=True)
-        }
+        sizes = (_written(1e6 * self.entry.basic + middle) for middle in middles)
+        return dict(zip(("D_H", "D_P"), sizes, strict=True))
 
     @property
     def meaning(self) -> list[str]:
@@ -184,11 +183,9 @@ def of(data: object, place: str) -> Fit:
 
 
 def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fault:
-    article = "an" if zones.kind == "interference" else "a"
-    found = (
-        f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
-        f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
-    )
+    kind = f"{'an' if zones.kind == 'interference' else 'a'} {zones.kind} fit"
+    found = f"{entry.code} is {kind}, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
+    found += f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
 
 

@@ -63,9 +63,8 @@ class NormalEntry(Banded):
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         """See `ToleranceEntry.build`."""
         if self.known_from is not None and self.truncate:
-            raise refuse(
-                "known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them"
-            )
+            found = "known_from is of parts as they are made, truncate of parts that are sorted"
+            raise refuse(found, "remove one of them")
         band = self.needed_band(site) if self.std is None else self.band(site)
         if self.std is not None and self.cpk is not None:
             raise refuse("std and cpk both define the standard deviation", "remove one of them")
@@ -287,9 +286,8 @@ class Tolerances(NamedTuple):
     def distributions(self) -> dict[str, Distribution]:
         """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
         of_quantities = {name: law for entry in self.entries for name, law in entry.quantities.items()}
-        return of_quantities | {
-            bonus.diameter: Accepted(of_quantities[bonus.diameter], bonus) for bonus in self.rejecting
-        }
+        accepted = {bonus.diameter: Accepted(of_quantities[bonus.diameter], bonus) for bonus in self.rejecting}
+        return of_quantities | accepted
 
     @property
     def lots(self) -> dict[str, Lot]:
@@ -301,11 +299,6 @@ class Tolerances(NamedTuple):
                 if (lot := getattr(model, "lot", None)) is not None:
                     lots[site.name] = Lot(lot.share, first if lot.shared else site.name)
         return lots
-
-    @property
-    def accepted(self) -> set[str]:
-        """Diameters by which parts are accepted."""
-        return {bonus.diameter for bonus in self.rejecting}
 
     @property
     def rejecting(self) -> list[Bonus]:

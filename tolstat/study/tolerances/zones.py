@@ -228,9 +228,8 @@ class OrientationEntry(ZoneEntry):
         meanings = [Meaning(self.number(), _columns(feature, "tilt", self.about or "tz"), "rad", slope, share)]
         if feature in PAIRS and not site.shared:
             moved = {"t": "z", "z": "t"}[self.about] if self.about else "tz"
-            meanings.insert(
-                0, Meaning(self.number(), _columns(feature, "offset", moved), "m", site.reach * slope, share)
-            )
+            offset = Meaning(self.number(), _columns(feature, "offset", moved), "m", site.reach * slope, share)
+            return [offset, *meanings]
         return meanings
 
 
@@ -316,13 +315,12 @@ def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[s
                 continue
             apart = 2.0 * site.reach
             if model.over < apart * (1.0 - 1e-9):
-                found = (
-                    f"{units.shown(model.over, 'm')} is shorter than the {units.shown(apart, 'm')} between the bearings"
-                )
+                over, between = units.shown(model.over, "m"), units.shown(apart, "m")
+                found = f"{over} is shorter than the {between} between the bearings"
                 remedy = (
                     "for a common axis over is the length from face to face with the joint's centre in the middle, "
-                    f"here 2 (R + z/2) = {units.shown(apart + length, 'm')}"
                 )
+                remedy += f"here 2 (R + z/2) = {units.shown(apart + length, 'm')}"
                 yield f"tolerances.{entry.pattern}.over", found, remedy
                 break
 
@@ -331,18 +329,15 @@ def _contradictions(direction: Any, position: PositionEntry, where: str) -> list
     """Faults of a zone of direction that does not refine the position of the same axis."""
     allowed, larger = position.zone.size / position.over, units.shown(direction.zone.size, "m")
     if not direction.zone.round:
-        return [
-            Fault(where, "is between planes beside a position", 'write a round zone, "⌀...", or remove the position')
-        ]
+        remedy = 'write a round zone, "⌀...", or remove the position'
+        return [Fault(where, "is between planes beside a position", remedy)]
     if direction.zone.size > position.zone.size * (1 + 1e-12):
-        found = (
-            f"⌀{larger} is larger than the position's zone, ⌀{units.shown(position.zone.size, 'm')}: it refines nothing"
-        )
+        other = units.shown(position.zone.size, "m")
+        found = f"⌀{larger} is larger than the position's zone, ⌀{other}: it refines nothing"
         return [Fault(where, found, "give a smaller zone, or remove it: the position bounds the tilt, too")]
     if direction.band > allowed * (1 + 1e-12):
-        found = (
-            f"allows a tilt of {units.shown(direction.band, 'rad')}, the position only {units.shown(allowed, 'rad')}"
-        )
+        tilt, most = units.shown(direction.band, "rad"), units.shown(allowed, "rad")
+        found = f"allows a tilt of {tilt}, the position only {most}"
         return [Fault(where, found, f"give at most ⌀{units.shown(allowed * direction.over, 'm')}, or remove it")]
     if position.bounded and not direction.bounded:
         found = "has parts outside its zone, the position has none"

@@ -146,7 +146,7 @@ def test_every_value_is_simulated_and_then_all_together(varied, quick):
 def test_a_value_that_the_joint_has_is_not_varied(tmp_path):
     other = '[{ shaft.axial = "free" }, { shaft.axial = "rigid" }]'
     free = TEXT.replace(GIVEN, f'{GIVEN}shaft.axial = "free"\n')
-    both, alone = loaded(tmp_path, free.replace('[{ shaft.axial = "free" }]', other)), made(tmp_path, free)
+    both, alone = synthetic.load(tmp_path, free.replace('[{ shaft.axial = "free" }]', other)), made(tmp_path, free)
     assert [one.label for one in variations.singles(both) if one.name == "mounting"] == ["shaft rigid"]
     assert simulated(alone).endswith("600 of each of 3 variations")
     found = standing(alone)

@@ -160,7 +160,7 @@ class Mechanism(NamedTuple):
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of lumps and shafts."""
-        return tuple(body.name for body in (*self.lumps, *self.shafts))
+        return tuple(body.name for body in self.lumps) + tuple(shaft.name for shaft in self.shafts)
 
     @property
     def lump_kinds(self) -> tuple[str, ...]:
@@ -222,8 +222,9 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
     ]
     held = {bushing.lump: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
     bases = {bushing.base: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
+    frames = [lump.member for lump in mechanism.lumps] + [shaft.member for shaft in mechanism.shafts]
     numbers: dict[str, object] = {
-        "frame": [member[part.member] for part in (*mechanism.lumps, *mechanism.shafts)],
+        "frame": [member[name] for name in frames],
         "quarters": [lump.quarters for lump in mechanism.lumps] + [0] * len(shafts),
         "lump_kind": [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps],
         "held_by": [held[lump.name] if lump.name in held else bases[lump.name] for lump in mechanism.lumps],

@@ -105,9 +105,7 @@ def simulate_rows(
         out, follows = blank_results(len(rows), mechanism), tables.follows_error(settings)
         blocks = blank_results((len(rows), settings.max_revs) if follows else (0, 0), mechanism)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
-        run = simulate_together(
-            params[rows], settings, still_allowed, bool(specs), out, mechanism, blocks, of_rows
-        )
+        run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, mechanism, blocks, of_rows)
         for i, samples in run:
             if out[i].status in SIMULATED:
                 for name, values in extracted(samples, histories, specs, mechanism).items():
@@ -267,7 +265,7 @@ def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechan
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
     steps = np.zeros(len(params), np.int64)
-    these = hitting(params, options) if len(mechanism.cardan) == 1 else np.zeros(0, np.intp)
+    these = hitting(params, options, mechanism)
     if not len(these):
         return steps
     from tolstat.kernel.lanes.explicit import count_steps
@@ -279,9 +277,9 @@ def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechan
     return steps
 
 
-def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
-    """Indices of the joints whose torque reverses, or nearly does, if they are to be refined."""
-    if not refinement.may_refine(options):
+def hitting(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.intp]:
+    """Indices of the Cardan joints whose torque reverses, or nearly does, if they are to be refined."""
+    if not refinement.may_refine(options) or mechanism != CARDAN:
         return np.zeros(0, np.intp)
     return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 

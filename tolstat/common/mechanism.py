@@ -18,6 +18,8 @@ Integers = NDArray[np.int64]
 
 HELD, DRIVEN, CLOSED_FORM = range(3)
 """How a member moves: not at all; about its z as the input does; as the closed form of a Cardan joint says."""
+ALONG_Z = 4
+"""Triad of a pin or hole along z, in place of a number of quarter turns: e, t, z are the member's z, x, y."""
 X, Y, Z = range(3)
 """Axis of the frame of a hole's member, about which the pin's member turns in it."""
 
@@ -52,7 +54,7 @@ class Lump(NamedTuple):
     kind : str
         Lumps of one kind have the same mass, inertia and distance of the reference point.
     quarters : int
-        Quarter turns about z that take the member's axes to the triad (e, t, z).
+        Quarter turns about z that take the member's axes to the triad (e, t, z), or `ALONG_Z`.
     """
 
     name: str

@@ -22,7 +22,7 @@ class LaneRecord(types.Record):
     The numbers of the mechanism are `constants` of the code, which loops over its parts are unrolled with.
     """
 
-    constants = {}
+    constants = None
 
     @property
     def dtype(self):
@@ -56,7 +56,7 @@ def _constant(name):
     """Implementation of an attribute of `LaneRecord`: one of its constants."""
 
     def get(record):
-        if name not in record.constants:
+        if not record.constants or name not in record.constants:
             return None
         value = record.constants[name]
         value = value if value.ndim > 0 else int(value)

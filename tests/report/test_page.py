@@ -26,7 +26,6 @@ from tolstat.display.html import bound, grouped
 from tolstat.display.table import Table
 from tolstat.questions import joints
 from tolstat.questions.exceedance import rows
-from tolstat.report import headline as verdict
 from tolstat.report import page
 from tolstat.store import Reader, ResultFile, revolutions
 from tolstat.store.recorded import recall
@@ -285,11 +284,11 @@ def test_limits_and_their_verdicts_stand_on_the_page(view, html):
 def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
     counted = {"n": 100, "n_failed": 0, "n_unsettled": 0, "count": 4, "bound_lower": 0.04, "bound_upper": 0.04}
     wide = counted | {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
-    assert verdict.verdict(wide, 0.05) == answer
+    assert rows.verdict(wide, 0.05) == answer
     narrow = counted | {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
-    assert verdict.verdict(narrow, 0.05) == answer
-    assert verdict.verdict(narrow, np.nan) == ""
-    assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "none"
+    assert rows.verdict(narrow, 0.05) == answer
+    assert rows.verdict(narrow, np.nan) == ""
+    assert rows.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "none"
 
 
 def test_reader_holds_the_shares_that_are_counted(view, html):

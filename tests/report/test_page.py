@@ -26,7 +26,7 @@ from tolstat.display.html import bound, grouped
 from tolstat.display.table import Table
 from tolstat.questions import joints
 from tolstat.questions.exceedance import rows
-from tolstat.report import page
+from tolstat.report import headline, page
 from tolstat.store import Reader, ResultFile, revolutions
 from tolstat.store.recorded import recall
 from tolstat.store.worst import MAX_LISTED
@@ -292,7 +292,7 @@ def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, 
 
 
 def test_reader_holds_the_shares_that_are_counted(view, html):
-    assert f"<option selected>{verdict.headline(view, 0.05).load}</option>" in html
+    assert f"<option selected>{headline.headline(view, 0.05).load}</option>" in html
     curves = rows.readings(view)
     assert list(curves) == [*view.bushing_loads, "pin1.contact", "psi"]
     status = view.status
@@ -317,7 +317,7 @@ def test_reader_begins_with_the_limit_that_the_verdict_names(tmp_path, limits, n
     path = synthetic.store(tmp_path, text)
     with ResultFile.open(path) as store:
         view = store.view()
-        assert verdict.headline(view, 0.05).load == name
+        assert headline.headline(view, 0.05).load == name
         made = page.compose(view, Asked(path, 0.05))
     (reader,) = (block for section in made.sections for block in section.blocks if isinstance(block, blocks.Reader))
     assert reader.start == name

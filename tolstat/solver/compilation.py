@@ -39,14 +39,14 @@ def _outside_model(mechanism: Mechanism, torque_reverses: bool = False) -> NDArr
 
 def _simulate(joints: int, options: Options, mechanism: Mechanism) -> None:
     params, results = np.repeat(_outside_model(mechanism), joints), simulation.blank_results(joints, mechanism)
-    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results, mechanism))
+    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results, mechanism=mechanism))
 
 
 def _explicit(options: Options, mechanism: Mechanism) -> None:
     results, steps = simulation.blank_results(1, mechanism), np.full(1, options.steps_per_rev)
     joint, settings = _outside_model(mechanism, torque_reverses=True), refinement.settings(options)
     left, blocks = np.full(1, 2**31), results[:, None]
-    list(simulation.simulate_together(joint, settings, left, False, results, mechanism, blocks, steps))
+    list(simulation.simulate_together(joint, settings, left, False, results, blocks, steps, mechanism))
 
 
 def _count_steps(options: Options, mechanism: Mechanism) -> None:
@@ -76,7 +76,7 @@ SECOND = ("lockstep.one_at_a_time", "explicit.explicit")
 """Kernels that the second process compiles; they take about as long as all others together."""
 
 
-def kernels(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism) -> list[str]:
+def kernels(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism = CARDAN) -> list[str]:
     """Names of the kernels that joints with these settings need.
 
     Kernels with explicit steps are only among them where one of the joints `params` needs them; without them such a
@@ -90,7 +90,7 @@ def kernels(options: Options, params: NDArray[np.void] | None, mechanism: Mechan
     return [name for name in KERNELS if name not in left_out]
 
 
-def missing(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism) -> list[str]:
+def missing(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism = CARDAN) -> list[str]:
     """Names of those that are not in the cache, for any mechanism."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
@@ -116,7 +116,7 @@ def warm_up(
     compile_kernels(kernels(options, params, mechanism), options, mechanism)
 
 
-def compile_kernels(names: list[str], options: Options, mechanism: Mechanism) -> None:
+def compile_kernels(names: list[str], options: Options, mechanism: Mechanism = CARDAN) -> None:
     """Compile or load these kernels of `KERNELS`."""
     for name in names:
         KERNELS[name](options, mechanism)

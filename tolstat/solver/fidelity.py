@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import measure_of
 from tolstat.common.loads import FloatArray, Load, load_of, of_kind, shown_loads
 from tolstat.common.mechanism import Mechanism
@@ -55,10 +56,10 @@ def choose(
     options: Options,
     budget: float,
     loads: Sequence[str],
-    mechanism: Mechanism,
     simulate: Callable[..., Simulation],
     min_steps: int = 0,
     closed_form: bool = True,
+    mechanism: Mechanism = CARDAN,
 ) -> dict[str, Any]:
     """Choose a rung by a pilot of joints.
 

@@ -14,7 +14,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, Signal, components, load_histories
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import OF_BUSHINGS, OF_SHAFTS, LoadHistory, Signal, components, load_histories
 from tolstat.common.load_kinds import CONTACTS, spans
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import HistorySpec, Options
@@ -31,7 +32,7 @@ are within 1 %."""
 
 
 def history_specs(
-    options: Options, histories: Histories, n_harmonics: int, mechanism: Mechanism
+    options: Options, histories: Histories, n_harmonics: int, mechanism: Mechanism = CARDAN
 ) -> dict[str, HistorySpec]:
     """Describe the load histories that are kept of each joint.
 
@@ -57,9 +58,9 @@ def history_specs(
         contact += "stations"
         modes = f"contact mode of pins 1-{pins}: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
-            "loads": _of_samples(of[BUSHING_LOADS], n),
+            "loads": _of_samples(of[OF_BUSHINGS], n),
             "contact": HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": _of_samples(of[SHAFT_LOADS], n),
+            "shafts": _of_samples(of[OF_SHAFTS], n),
             "mode": HistorySpec((n, pins), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
@@ -74,14 +75,14 @@ def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
 
 
 def extracted(
-    samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec], mechanism: Mechanism
+    samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec], mechanism: Mechanism = CARDAN
 ) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
         fields = {name: samples["loads"][:, span] for name, span in spans(mechanism).items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    fields = {BUSHING_LOADS: samples["components"], SHAFT_LOADS: samples["shafts"]}
+    fields = {OF_BUSHINGS: samples["components"], OF_SHAFTS: samples["shafts"]}
     loads = {name: np.ascontiguousarray(values) for name, values in fields.items()}
     sample = cycles(loads, mechanism) if "cycles" in histories else {}
     if "harmonics" in histories:
@@ -89,7 +90,7 @@ def extracted(
     return sample
 
 
-def harmonic_specs(n_coefficients: int, mechanism: Mechanism) -> dict[str, HistorySpec]:
+def harmonic_specs(n_coefficients: int, mechanism: Mechanism = CARDAN) -> dict[str, HistorySpec]:
     """Describe what `coefficients` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in load_histories(mechanism).values():
@@ -106,7 +107,7 @@ def harmonic_specs(n_coefficients: int, mechanism: Mechanism) -> dict[str, Histo
 
 
 def coefficients(
-    loads: Mapping[str, NDArray[np.float64]], n_coefficients: int, mechanism: Mechanism
+    loads: Mapping[str, NDArray[np.float64]], n_coefficients: int, mechanism: Mechanism = CARDAN
 ) -> dict[str, NDArray[Any]]:
     """Fourier coefficients of the loads of a joint.
 
@@ -124,7 +125,7 @@ def coefficients(
     dict
         By name of `specs`. Errors of all loads are relative to the largest bushing force and torque.
     """
-    bushing = loads[BUSHING_LOADS]
+    bushing = loads[OF_BUSHINGS]
     size = [np.linalg.norm(bushing[..., k : k + 3], axis=-1).max() for k in (0, 3)]
     coefficients: dict[str, NDArray[Any]] = {}
     for history in load_histories(mechanism).values():
@@ -158,7 +159,7 @@ def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.
     return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
 
 
-def cycle_specs(mechanism: Mechanism) -> dict[str, HistorySpec]:
+def cycle_specs(mechanism: Mechanism = CARDAN) -> dict[str, HistorySpec]:
     """Describe what `cycles` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in load_histories(mechanism).values():
@@ -266,7 +267,7 @@ def between(
     return ranges, means, numbers, replaced[which.ravel()]
 
 
-def cycles(loads: Mapping[str, NDArray[Any]], mechanism: Mechanism) -> dict[str, NDArray[Any]]:
+def cycles(loads: Mapping[str, NDArray[Any]], mechanism: Mechanism = CARDAN) -> dict[str, NDArray[Any]]:
     """Rainflow cycles of all load components of a joint.
 
     Parameters
@@ -285,7 +286,7 @@ def cycles(loads: Mapping[str, NDArray[Any]], mechanism: Mechanism) -> dict[str,
     described, kept, end = cycle_specs(mechanism), dict[str, NDArray[Any]](), 0
     counted = None
     if all(np.isfinite(values).all() for values in loads.values()):
-        counted = count(loads, tuple(components(mechanism).values()), mechanism)
+        counted = count(loads, tuple(components(mechanism).values()), mechanism=mechanism)
     for history in load_histories(mechanism).values():
         names = [f"{history.prefix}{name}" for name in ("cycles", "cycle_count")]
         table, number = (described[name].blank(1)[0] for name in names)
@@ -298,7 +299,7 @@ def cycles(loads: Mapping[str, NDArray[Any]], mechanism: Mechanism) -> dict[str,
 
 
 def count(
-    loads: Mapping[str, NDArray[Any]], signals: tuple[Signal, ...], mechanism: Mechanism, kept: int = KEPT
+    loads: Mapping[str, NDArray[Any]], signals: tuple[Signal, ...], kept: int = KEPT, mechanism: Mechanism = CARDAN
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Rainflow cycles of some signals of a joint over one revolution.
 
@@ -325,7 +326,7 @@ def count(
     from tolstat.kernel.revolution import rainflow
 
     places, factors = _tables(signals, mechanism)
-    bushing = loads[BUSHING_LOADS]
+    bushing = loads[OF_BUSHINGS]
     sizes = [np.linalg.norm(bushing[..., part].astype(float), axis=-1).max() for part in (slice(3), slice(3, 6))]
     gates = GATE * (np.abs(factors) @ np.repeat(sizes, 3))
     histories = [loads[name] for name in load_histories(mechanism) if name in loads]

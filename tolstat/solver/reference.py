@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import kinds, measure_of, spans
 from tolstat.common.loads import FloatArray, put_largest
 from tolstat.common.mechanism import Mechanism
@@ -71,7 +72,7 @@ class FirstOrder(NamedTuple):
 
 
 def first_order(
-    params: NDArray[np.void], options: Options, mechanism: Mechanism, from_start: bool = False
+    params: NDArray[np.void], options: Options, from_start: bool = False, mechanism: Mechanism = CARDAN
 ) -> FirstOrder:
     """Simulate a joint until it settles, and return it as a first-order system that starts in the settled state.
 
@@ -101,7 +102,7 @@ def first_order(
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
     settled = np.zeros(1, tables.tables(mechanism).RESULT)
     allowed = np.full(1, tables.iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, revolution),) = simulate_together(params, options, allowed, True, settled, mechanism)
+    ((_, revolution),) = simulate_together(params, options, allowed, True, settled, mechanism=mechanism)
     period = 2 * np.pi / abs(float(par.omega))
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
@@ -142,12 +143,12 @@ def first_order(
 def reference_rows(
     params: NDArray[np.void],
     options: Options,
-    mechanism: Mechanism,
     rtol: float = 1e-7,
     integrator: IntegratorName = "Radau",
     closure_tol: float = 1e-5,
     max_steps: int = MAX_STEPS,
     angles: int | None = None,
+    mechanism: Mechanism = CARDAN,
 ) -> NDArray[np.void]:
     """Solve joints with a tight tolerance from their settled state until their largest loads repeat.
 
@@ -183,7 +184,7 @@ def reference_rows(
     """
     results = tables.without_results(len(params), Status.NEWTON_FAILED, mechanism)
     for i in range(len(params)):
-        system = first_order(params[i : i + 1], options, mechanism)
+        system = first_order(params[i : i + 1], options, mechanism=mechanism)
         status = Status(system.settled["status"][0])
         if status in SIMULATED:
             revolutions = _revolutions(system, rtol, integrator, max_steps, angles)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import kinds, measure_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import SIMULATED, STEPS_PER_ITERATION, UNSETTLED, VALID, Fidelity, Method, Options, Status
@@ -59,7 +60,7 @@ def settings(options: Options) -> Options:
     return options._replace(method=int(Method.TR_BDF2), rtol=TOLERANCE, max_revs=revs)
 
 
-def refine(results: NDArray[np.void], options: Options, mechanism: Mechanism, simulate: Simulate) -> None:
+def refine(results: NDArray[np.void], options: Options, simulate: Simulate, mechanism: Mechanism = CARDAN) -> None:
     """Repeat joints that need it with finer steps, until their largest loads change no more.
 
     Parameters

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import Estimate
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import kinds, measure_of
 from tolstat.common.loads import FloatArray
 from tolstat.common.mechanism import Mechanism
@@ -45,7 +46,7 @@ STEP_ERROR = 0.01
 Table = NDArray[np.void]
 
 
-def classify(results: Table, blocks: Table, duration: int, mechanism: Mechanism) -> None:
+def classify(results: Table, blocks: Table, duration: int, mechanism: Mechanism = CARDAN) -> None:
     """Set the status of stationary joints; write their largest loads and, by kind of load, the widest interval.
 
     Parameters
@@ -77,7 +78,7 @@ def classify(results: Table, blocks: Table, duration: int, mechanism: Mechanism)
             results[f"{kind}_lower"][i], results[f"{kind}_upper"][i] = (lower / size).min(), (upper / size).max()
 
 
-def fill_intervals(results: Table, mechanism: Mechanism) -> None:
+def fill_intervals(results: Table, mechanism: Mechanism = CARDAN) -> None:
     """Write the interval ends of joints that repeat, 1 (no uncertainty), and of joints without a valid load, NaN.
 
     Parameters
@@ -94,7 +95,7 @@ def fill_intervals(results: Table, mechanism: Mechanism) -> None:
             ends[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 
-def is_stationary(watched: Table, mechanism: Mechanism) -> bool:
+def is_stationary(watched: Table, mechanism: Mechanism = CARDAN) -> bool:
     """Whether the largest loads of both halves of the revolutions watched are alike, in mean and in spread.
 
     Parameters

@@ -65,7 +65,7 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
                 which = f"{'most often above' if sample.above(sample.limit).count else 'nearest to'} its limit"
             title = f"{place.name or load}: {which}"
             title += f", at {view.point_of(load)}" if len(view.points) > 1 else ""
-        panel = _joint(view, [place.name], load)[place.view == "side"]
+        panel = _joint(view, [place.name], load)[place.group not in ("cross", "pin")]
         return replace(panel, key="joint-worst", title=title)
     return None
 

@@ -41,7 +41,7 @@ def rattling(n: int) -> NDArray[np.void]:
     """Joints of the first study where the torque reverses, (n,) PARAM."""
     plan = study.load(STUDY, n=n)
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[1:])
-    params["alpha"], params["omega"], params["torque"] = np.radians(15), 3000 * np.pi / 30, 100.0
+    params["alpha"][:, 0], params["omega"], params["torque"] = np.radians(15), 3000 * np.pi / 30, 100.0
     return params
 
 

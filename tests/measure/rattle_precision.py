@@ -59,7 +59,7 @@ def main() -> None:
     """Print the table."""
     plan = study.load(STUDY, n=LANES + 1)
     params: NDArray[np.void] = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[1:])
-    params["alpha"], params["omega"] = np.radians(30), 1500 * np.pi / 30
+    params["alpha"][:, 0], params["omega"] = np.radians(30), 1500 * np.pi / 30
     mine = params[list(ROWS)]
     systems = [first_order(mine[i : i + 1], Options(max_refinements=0), from_start=True) for i in range(len(ROWS))]
     true = [explicit(system, 1e-7)[0] for system in systems]

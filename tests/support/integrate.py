@@ -71,7 +71,7 @@ def lu(matrix, pivots):
 
 
 @njit
-def solve(q, work):
+def solve(q, par, work):
     """Solve the factorised system for ``work.solution`` in place."""
     x, matrix, n = work.solution, work.matrix, work.pivots.size
     for k in range(n):

@@ -157,7 +157,7 @@ def build_advance(
         Residual of the equations of motion.
     factorise : jitted function (t, q, v, a, cv, ca, par, options, work) -> bool
         Assembles and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
-    solve : jitted function (q, work) -> None
+    solve : jitted function (q, par, work) -> None
         Solves for ``work.solution`` in place.
     size : jitted function (cv, ca, state) -> float
         Norm of ``state.residual`` that is compared with ``options.newton_tol``.
@@ -196,7 +196,7 @@ def build_advance(
             before = now
             for i in range(q.size):
                 work.solution[i] = -state.residual[i]
-            solve(q, work)
+            solve(q, par, work)
             state.counters[ITERATIONS] += 1
             for i in range(q.size):
                 change = work.solution[i]

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic
+from tests.support.mechanisms import N_DOF
 from tolstat.common.channels import CHANNELS
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.load_kinds import KIND, LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import LOADS, largest, of_kind, put_largest
 from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
-from tolstat.kernel.mechanics import dynamics, ideal_loads, loads
+from tolstat.kernel.mechanics import dynamics, loads
+from tolstat.kernel.mechanics.cardan import ideal_loads
 from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_INSTANT, N_LOADS, OF_MEASURE, OTHERS
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution import settle
 from tolstat.solver.simulation import simulate_rows
@@ -103,7 +104,7 @@ def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> Non
     at_rest = np.zeros(N_DOF)
     dynamic = written(lambda work: dynamics.forces(0.01, at_rest, at_rest, par, work))
     ideal = written(lambda work: ideal_loads.ideal_loads(0.5, at_rest, par, work))
-    for name in ("load", "contact", "mode", "force", "shaft", "turned", "pos", "vel"):
+    for name in ("load", "contact", "mode", "force", "frame_w", "turned", "pos", "vel"):
         assert dynamic[name].all(), name
         assert ideal[name].all(), name
     work = make_work()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tests.support import naive
+from tests.support.mechanisms import N_DOF, S, body
 from tolstat.common.channels import CHANNELS, COMPONENTS, SHAFT_LOADS
 from tolstat.common.load_kinds import ORDERS, SPAN
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Options, Status, for_kernels
 from tolstat.kernel.mechanics import dynamics, loads
-from tolstat.kernel.mechanics.topology import INPUT_SHAFT
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.settle import make_samples
@@ -112,25 +112,25 @@ def test_shafts_carry_what_the_naive_twin_says(params, random_errors, speed: flo
     for name, value in SLIDING.items() if slides else ():
         par[name] = value
     rng = np.random.default_rng(8)
-    q, v, t = 1e-4 * rng.normal(size=56), 1e-2 * rng.normal(size=56), 0.019
-    q[55] = 3e-4
+    q, v, t = 1e-4 * rng.normal(size=N_DOF), 1e-2 * rng.normal(size=N_DOF), 0.019
+    q[S] = 3e-4
     work = make_work()
     dynamics.forces(t, q, v, par, work)
     loads.write_loads(v, par, work)
     loads.complete_loads(par, work)
-    force, bodies = naive.forces(t, q, v, par)[0], naive.Bodies(t, q, par)
-    output = naive.turn((0, 1, 0), par.alpha)
-    for shaft, (name, axes) in enumerate((("in", np.eye(3)), ("out", output))):
-        f, about = force[name][:3], bodies.position[name]
-        m = force[name][3:] + np.cross(about, f)
+    force, places = naive.forces(t, q, v, par).force, naive.bodies(t, q, par).position
+    output = naive.turn((0, 1, 0), par.alpha[0])
+    for shaft, (name, axes) in enumerate((("input", np.eye(3)), ("output", output))):
+        f, about = force[body(name), :3], places[body(name)]
+        m = force[body(name), 3:] + np.cross(about, f)
         f, m = axes.T @ f, axes.T @ m
-        if name == "out" and slides:
-            f[2] = par.k_a * q[55] + par.c_a * v[55] - par.F_a
+        if name == "output" and slides:
+            f[2] = par.k_a * q[S] + par.c_a * v[S] - par.F_a
         np.testing.assert_allclose(work.shafts[shaft], [*f, *m], rtol=1e-6, atol=1e-5 * np.abs(f).max())
         assert work.loads[loads.LATERAL + shaft] == pytest.approx(np.hypot(*f[:2]), rel=1e-5)
         assert work.loads[loads.MOMENT + shaft] == pytest.approx(np.hypot(*m[:2]), rel=1e-4)
         assert work.loads[loads.AXIAL + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
-    assert work.pos[INPUT_SHAFT, 2] == 0
+    assert work.pos[body("input"), 2] == 0
 
 
 @pytest.mark.parametrize(("speed", "fidelity"), [(500 * RPM, 0), (-500 * RPM, 0), (500 * RPM, 1)])

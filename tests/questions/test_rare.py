@@ -118,7 +118,7 @@ def asked(plan, beta=2.5, **more):
 def perturb(joint, operation, errors):
     params = np.zeros(len(errors), PARAM)
     params["R"] = sum(errors[f"pin{i}.offset_t"] for i in (1, 2, 3, 4)) * 3e4 / SIGMA
-    params["alpha"] = errors["pin1.offset_t"] * 3e4
+    params["alpha"][:, 0] = errors["pin1.offset_t"] * 3e4
     return params
 
 

@@ -189,7 +189,7 @@ def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
 
 def perturb(joint: Any, operation: Operation, errors: np.ndarray) -> np.ndarray:
     params = np.zeros(len(errors), PARAM)
-    params["alpha"] = operation.alpha + errors["operation.alpha"]
+    params["alpha"][:, 0] = operation.alpha + errors["operation.alpha"]
     params["R"] = errors["pin1.offset_t"]
     return params
 
@@ -208,7 +208,7 @@ def simulate(
     """Simulate joints by a formula, `seconds` each; one in ten fails, one in ten does not settle."""
     time.sleep(seconds * len(params))
     results = np.zeros(len(params), RESULT)
-    x = params["R"] + 2 * params["alpha"]
+    x = params["R"] + 2 * params["alpha"][:, 0]
     results["status"] = np.where(x > 3, Status.NEWTON_FAILED, np.where(x < -3, Status.NOT_SETTLED, Status.OK))
     results["settled"] = results["status"] == Status.OK
     results["steps"] = options.steps_per_rev

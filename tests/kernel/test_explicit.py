@@ -13,7 +13,7 @@ from tolstat.common.tables import Options
 from tolstat.kernel.integrators.stability import depth_at, eigenvalue, fewest_steps, largest_force
 from tolstat.kernel.integrators.verlet import correct, predict
 from tolstat.kernel.mechanics.work import make_work
-from tolstat.kernel.revolution.peaks import PEAKS, follow_value, forget
+from tolstat.kernel.revolution.peaks import follow_value, forget, peaks_dtype
 
 
 def oscillator(steps: int, stiffness: float, damping: float, end: float = 1.0) -> float:
@@ -129,16 +129,16 @@ def test_steps_are_stable_and_not_many_more_than_needed(params, random_errors, l
     assert largest_force(2 * steps, par, work) > force
 
 
-def test_peaks_between_steps_are_met() -> None:
-    peaks = np.zeros(1, PEAKS).view(np.recarray)[0]
+def test_peaks_between_steps_are_met(params) -> None:
+    peaks, par = np.zeros(1, peaks_dtype(CARDAN)).view(np.recarray)[0], params()[0]
     forget(True, peaks)
     curve = 3 + np.sin(0.3 * np.arange(25) + 0.2)
     for value in curve:
-        follow_value(2, value, peaks)
+        follow_value(2, value, par, peaks)
     assert curve.max() < 4 - 1e-3
     assert peaks.top[2] == pytest.approx(4, abs=2e-4)
     assert (peaks.last[2], peaks.before[2]) == (curve[-1], curve[-2])
     forget(True, peaks)
     for value in (5.0, 4.0, 3.0):
-        follow_value(2, value, peaks)
+        follow_value(2, value, par, peaks)
     assert peaks.top[2] == 5.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from studies.precision.measuring import parameters
 from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import RESULT, Fidelity, Method, Options
+from tolstat.common.tables import RESULT, Fidelity, Method, Options, for_kernels
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ def tally(these: Sample) -> NDArray[np.int64]:
 
     params, options = these
     left, samples = np.full(len(params), UNLIMITED), make_samples(0, options.steps_per_rev)
-    return simulation.run_lanes(simulation.make_queue(params, options, left, samples, simulation.NO_BLOCKS), options)
+    none = for_kernels(simulation.blank_results((0, 0), CARDAN))
+    return simulation.run_lanes(simulation.make_queue(params, options, left, samples, none), options)
 
 
 def dense(work: np.record, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:

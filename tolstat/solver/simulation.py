@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.parameters import numbers
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
@@ -212,8 +211,7 @@ def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> 
 def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width, mechanism)
-    for name in ("n_stations", "n_orders", *numbers(mechanism)):
-        batch.par[name] = queue.rows[name][0]
+    batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
     return batch
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from tests.support.graphs import cardan, free_tube
-from tests.support.mechanisms import CARDAN, blank, body, in_series, triads, unknown
+from tests.support.mechanisms import body, triads, unknown
 from tolstat.common import files
+from tolstat.common.cardan import CARDAN, SERIES
 from tolstat.common.mechanism import Mechanism, blocks_of, numbering
-from tolstat.common.tables import PARAM
+from tolstat.common.tables import PARAM, blank_params
 
 FRAMES = {"C": "cross", "I": "input", "F": "output"}
 DIRECTIONS = {"+R x": (1, 0, 0), "−R x": (-1, 0, 0), "+R y": (0, 1, 0), "−R y": (0, -1, 0), "centre O": None}
@@ -64,7 +65,7 @@ def test_bushings_carry_pins_on_the_hub_and_arms_on_their_shaft() -> None:
         assert member[bushing.lump] == member[base]
 
 
-@pytest.fixture(params=[CARDAN, in_series()], ids=["cardan", "in series"])
+@pytest.fixture(params=[CARDAN, SERIES], ids=["cardan", "in series"])
 def mechanism(request: pytest.FixtureRequest) -> Mechanism:
     return request.param
 
@@ -96,7 +97,7 @@ def test_numbers_name_the_parts(mechanism: Mechanism) -> None:
 
 
 def test_parameters_hold_the_numbers(mechanism: Mechanism) -> None:
-    row = blank(mechanism, 2)[1]
+    row = blank_params(2, mechanism)[1]
     for name, values in numbering(mechanism).items():
         np.testing.assert_array_equal(row[name], values)
     assert (row.dtype == PARAM) == (mechanism == CARDAN)
@@ -113,7 +114,7 @@ def test_a_bushing_between_lumps_has_a_block_of_its_own(mechanism: Mechanism) ->
 
 def test_shafts_that_turn_as_one_are_joined_to_the_arms_of_both_forks() -> None:
     """Of two joints in series psi of the tube; of each the holes are eliminated first, and the hub last."""
-    numbers, mechanism = numbering(in_series()), in_series()
+    numbers, mechanism = numbering(SERIES), SERIES
     assert numbers["turn"].tolist() == [-1, 0, 0, 1]
     touched = {
         (mechanism.unknowns[u], mechanism.bodies[lump])
@@ -131,5 +132,5 @@ def test_the_plan_is_that_of_the_graph() -> None:
     plan, numbers = cardan().plan(), numbering(CARDAN)
     for name, values in plan.items():
         np.testing.assert_array_equal(numbers[name], values, err_msg=name)
-    assert free_tube().lumps == len(in_series().lumps) + 1
+    assert free_tube().lumps == len(SERIES.lumps) + 1
     assert body("hub") == 0

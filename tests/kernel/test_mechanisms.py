@@ -8,14 +8,14 @@ import pytest
 from tests.support import naive
 from tests.support.graphs import GRAPHS, put_system, system
 from tests.support.kernel_states import dense
-from tests.support.mechanisms import in_series, joined
+from tests.support.mechanisms import joined
+from tolstat.common.cardan import SERIES
 from tolstat.common.tables import Options
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.work import make_work, work_dtype
 
 OPTIONS = Options()
-SERIES = in_series()
 AHEAD = 0.5 * np.pi + 0.4
 
 

@@ -87,7 +87,7 @@ def test_orders_of_the_ideal_joint_are_those_of_its_closed_form(params, fidelity
         assert of(f"{name}_1x", found) < 1e-4 * TORQUE
 
 
-def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude() -> None:
+def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude(params) -> None:
     """At order 2 both ways round and to and fro, beside a constant force and other orders."""
     theta = 2 * np.pi * np.arange(90) / 90
     turning = 22 * np.exp(2j * theta) + 500 + 3 * np.exp(1j * theta)
@@ -96,7 +96,7 @@ def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude() -> Non
         samples.shafts[:], samples.psi[:] = 0.0, 1e-3 * np.cos(3 * theta - 1)
         samples.shafts[:, 1, 0], samples.shafts[:, 1, 1] = curve.real, curve.imag
         samples.shafts[:, 0, 5] = 100 + 7 * np.sin(4 * theta)
-        write_orders(samples, result)
+        write_orders(params()[0], samples, result)
         largest = {key: result.largest[span] for key, span in SPAN.items()}
         assert largest["lateral_orders"] == pytest.approx([0, 0, 0, 0, 3, 22, 0, 0], abs=1e-10)
         assert largest["drive_orders"] == pytest.approx([0, 0, 0, 7], abs=1e-10)
@@ -127,9 +127,9 @@ def test_shafts_carry_what_the_naive_twin_says(params, random_errors, speed: flo
         if name == "output" and slides:
             f[2] = par.k_a * q[S] + par.c_a * v[S] - par.F_a
         np.testing.assert_allclose(work.shafts[shaft], [*f, *m], rtol=1e-6, atol=1e-5 * np.abs(f).max())
-        assert work.loads[loads.LATERAL + shaft] == pytest.approx(np.hypot(*f[:2]), rel=1e-5)
-        assert work.loads[loads.MOMENT + shaft] == pytest.approx(np.hypot(*m[:2]), rel=1e-4)
-        assert work.loads[loads.AXIAL + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
+        assert work.loads[par.begin[loads.LATERAL] + shaft] == pytest.approx(np.hypot(*f[:2]), rel=1e-5)
+        assert work.loads[par.begin[loads.MOMENT] + shaft] == pytest.approx(np.hypot(*m[:2]), rel=1e-4)
+        assert work.loads[par.begin[loads.AXIAL] + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
     assert work.pos[body("input"), 2] == 0
 
 

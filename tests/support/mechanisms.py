@@ -1,14 +1,14 @@
-"""Numbers of a mechanism's parts by their names, parameters of a mechanism, and two Cardan joints in series."""
+"""Numbers of a mechanism's parts by their names, and parameters of two Cardan joints in series."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
-from tolstat.common.fields import dtype_of
-from tolstat.common.mechanism import Bushing, Hinge, Lump, Mechanism, Member, Pair, Shaft, numbering
-from tolstat.common.parameters import param_fields
+from tolstat.common.cardan import CARDAN, SERIES
+from tolstat.common.mechanism import ALONG_Z, Mechanism
+from tolstat.common.parameters import numbers
+from tolstat.common.tables import blank_params
 
 
 def body(name: str, mechanism: Mechanism = CARDAN) -> int:
@@ -35,6 +35,9 @@ def triads(mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
     """Rows e, t, z of each lump in axes of its member, (lumps, 3, 3)."""
     found = []
     for lump in mechanism.lumps:
+        if lump.quarters == ALONG_Z:
+            found.append(np.roll(np.eye(3), 1, axis=0))
+            continue
         angle = 0.5 * np.pi * lump.quarters
         e, z = np.array([np.cos(angle), np.sin(angle), 0.0]).round(), np.array([0.0, 0.0, 1.0])
         found.append([e, np.cross(z, e), z])
@@ -47,39 +50,8 @@ PSI, S = unknown("psi"), unknown("s")
 """Numbers of the unknowns of its output shaft."""
 
 
-def _renamed(mechanism: Mechanism, prefix: str, unknowns: dict[str, tuple[str, str]]) -> Mechanism:
-    """A mechanism with `prefix` before all names but those of kinds; `unknowns`: psi and s of each shaft."""
-    members = tuple(Member(prefix + one.name, one.motion, one.about_z) for one in mechanism.members)
-    lumps = tuple(Lump(prefix + one.name, prefix + one.member, one.kind, one.quarters) for one in mechanism.lumps)
-    shafts = tuple(Shaft(prefix + one.name, prefix + one.member, *unknowns[one.name]) for one in mechanism.shafts)
-    bushings = tuple(
-        Bushing(prefix + one.name, prefix + one.lump, prefix + one.base, one.kind) for one in mechanism.bushings
-    )
-    hinges = tuple(Hinge(prefix + one.name, prefix + one.pin, prefix + one.hole, one.axis) for one in mechanism.hinges)
-    pairs = tuple(Pair(prefix + one.pin, prefix + one.hole, prefix + one.hinge) for one in mechanism.pairs)
-    cardan = tuple(prefix + name for name in mechanism.cardan)
-    return Mechanism(prefix, members, lumps, shafts, bushings, hinges, pairs, (), cardan)
-
-
-def in_series() -> Mechanism:
-    """Two Cardan joints: the tube turns by ``psi1`` in both, the output shaft by ``psi2``; nothing slides."""
-    first = _renamed(CARDAN, "joint1.", {"input": ("", ""), "output": ("psi1", "")})
-    second = _renamed(CARDAN, "joint2.", {"input": ("psi1", ""), "output": ("psi2", "")})
-    parts = ("members", "lumps", "shafts", "bushings", "hinges", "pairs")
-    both = {name: getattr(first, name) + getattr(second, name) for name in parts}
-    return Mechanism("two joints", **both, unknowns=("psi1", "psi2"), cardan=first.cardan + second.cardan)
-
-
-def blank(mechanism: Mechanism, n: int = 1) -> NDArray[np.void]:
-    """Parameters of `n` mechanisms: their numbers, and zeros."""
-    params = np.zeros(n, dtype_of(param_fields(mechanism)))
-    for name, values in numbering(mechanism).items():
-        params[name] = values
-    return params
-
-
 def joined(first: np.record, second: np.record, ahead: float, inertia: float) -> np.recarray:
-    """Parameters of two joints in series from those of each, by the same dtype as `blank`.
+    """Parameters of two joints in series, `SERIES`, from those of each.
 
     Parameters
     ----------
@@ -91,10 +63,10 @@ def joined(first: np.record, second: np.record, ahead: float, inertia: float) ->
     inertia : float
         Of the tube, kg m^2.
     """
-    params = blank(in_series()).view(np.recarray)
-    row, own = params[0], numbering(in_series())
+    params = blank_params(1, SERIES).view(np.recarray)
+    row, own = params[0], numbers(SERIES)
     for name in params.dtype.names:
-        if name in own:
+        if name in own or name not in first.dtype.names:
             continue
         if row[name].shape == first[name].shape:
             row[name] = first[name]

@@ -45,8 +45,12 @@ lane : int
     Number of the lane; 0 for a single joint.
 body : int
     Number of the body: lumps, then shafts.
-bushing, pin : int
-    Number of the bushing; of the pair of pin and hole.
+base : int
+    Number of the body that holds a bushing.
+bushing, pin, hinge, shaft, joint : int
+    Number of the bushing; of the pair of pin and hole; of the hinge; of the shaft; of the Cardan joint.
+mechanism : Mechanism
+    What the joints are.
 status : int
     How a joint has ended, a `Status`.
 loads : ndarray, shape (n,)

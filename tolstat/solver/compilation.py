@@ -76,7 +76,7 @@ SECOND = ("lockstep.one_at_a_time", "explicit.explicit")
 """Kernels that the second process compiles; they take about as long as all others together."""
 
 
-def kernels(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism = CARDAN) -> list[str]:
+def kernels(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
     """Names of the kernels that joints with these settings need.
 
     Kernels with explicit steps are only among them where one of the joints `params` needs them; without them such a
@@ -90,7 +90,7 @@ def kernels(options: Options, params: NDArray[np.void] | None, mechanism: Mechan
     return [name for name in KERNELS if name not in left_out]
 
 
-def missing(options: Options, params: NDArray[np.void] | None, mechanism: Mechanism = CARDAN) -> list[str]:
+def missing(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
     """Names of those that are not in the cache, for any mechanism."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 

@@ -183,7 +183,7 @@ def connect_shaft(unknown, arm, f, torque, edge):
 
 @njit
 def _directions(pin, j, par, work):
-    """Write d(displacements of a station along n and m) / d(pin, hole) to ``work.vectors``."""
+    """Write d(displacements of station `j` along n and m) / d(pin, hole) to ``work.vectors``."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])

@@ -13,6 +13,7 @@ from tolstat.kernel.integrators.first_order import rate
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.solver import simulation
 
+pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
 NUMBERS = (1, 2, 3)
 LINE = Mechanism(
     "shaft in three bearings",
@@ -63,7 +64,6 @@ def test_the_middle_bearing_is_pressed_by_its_offset() -> None:
     np.testing.assert_allclose(found["F_max"][0, [0, 2]], 0.0, atol=1e-6 * force(depth))
 
 
-@pytest.mark.slow
 def test_its_motion_is_that_of_the_naive_twin() -> None:
     """From rest, both by Radau: the kernel's accelerations, and the twin's equations in world coordinates."""
     par, work, end = parameters(6e-5)[0], make_work(LINE), 1e-4

@@ -180,17 +180,17 @@ def unselected(study: Study) -> tuple[str, ...]:
 
 def _groups(names: Sequence[str], mechanism: Mechanism) -> Iterator[str]:
     """Describe errors of pins and holes, those of alike features together."""
-    pins, holes = (set(each) for each in list(zip(*mechanism.pairs, strict=True))[:2])
-    for part, of_part in (("pin", pins), ("hole", holes)):
-        every = [feature for feature in features(mechanism) if feature in of_part]
+    pins = {pair.pin for pair in mechanism.pairs}
+    for part in ("pin", "hole"):
+        every = [feature for feature in features(mechanism) if (feature in pins) == (part == "pin")]
         for noun, keys in _AXES.items():
             lacking = {feature: tuple(key for key in keys if f"{feature}.{key}" in names) for feature in every}
             for alike in filter(None, dict.fromkeys(lacking.values())):
-                features = [feature for feature in every if lacking[feature] == alike]
-                whole = len(features) == len(every)
-                listed = " and ".join(", ".join(features).rsplit(", ", 1))
+                those = [feature for feature in every if lacking[feature] == alike]
+                whole = len(those) == len(every)
+                listed = " and ".join(", ".join(those).rsplit(", ", 1))
                 what = f"{part} {noun}" if whole else f"{noun} of {listed}"
-                axes = f"the {part} axes" if whole else "their axes" if len(features) > 1 else "its axis"
+                axes = f"the {part} axes" if whole else "their axes" if len(those) > 1 else "its axis"
                 yield what if alike == keys else f"{what} {_along(alike, axes)}"
 
 

@@ -111,10 +111,7 @@ def words(study: Study, text: str) -> str:
     """What a text changes: keys with their values before and after, entries that are gone, and new ones."""
     old, new = (_flat(tomllib.loads(each)) for each in (study.text, text))
     values = [f"{key} {old[key]} → {value}" for key, value in new.items() if key in old and old[key] != value]
-    gone, added = (
-        list(dict.fromkeys(_shown(key, study.mechanism) for key in a.keys() - b.keys()))
-        for a, b in ((old, new), (new, old))
-    )
+    gone, added = ({_shown(key, study.mechanism) for key in a.keys() - b.keys()} for a, b in ((old, new), (new, old)))
     found = {"changed": values, "without": sorted(gone), "new": sorted(added)}
     return "; ".join(f"{word}: {', '.join(items)}" for word, items in found.items() if items)
 

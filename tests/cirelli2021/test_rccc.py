@@ -11,7 +11,7 @@ from studies.cirelli2021 import rccc, rccc_statics
 from tests.conftest import REFERENCE
 from tests.support.closed_forms import cross_couple, pin_force
 from tests.support.mechanisms import body, triads
-from tolstat.common.cardan import HOLE_OF_PIN
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.joint import Operation, ideal, nominal_errors
 
 THETA = np.linspace(0, 2 * np.pi, 73) + 0.03
@@ -24,7 +24,7 @@ FEATURES = [f"{kind}{i}" for kind in ("pin", "hole") for i in (1, 2, 3, 4)]
 @pytest.fixture
 def errors():
     def make(alpha=15.0, seed=None, offset=2e-4, tilt=1e-2, **given):
-        table = nominal_errors(1)
+        table = nominal_errors(1, CARDAN)
         table["operation.alpha"] = np.radians(alpha)
         rng = np.random.default_rng(seed)
         for feature in FEATURES if seed is not None else ():

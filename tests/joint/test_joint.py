@@ -13,16 +13,19 @@ from scipy.spatial.transform import Rotation
 from tests.support.mechanisms import bushing_kind, lump_kind
 from tolstat import joint as joints
 from tolstat.common import files
-from tolstat.common.cardan import HOLE_OF_PIN
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import PINS
+from tolstat.common.mechanism import features
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import validate
-from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM
+from tolstat.common.tables import tables
 from tolstat.joint import Joint, Operation, material
 from tolstat.joint.contact import LAWS
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, one_force
 
+PARAM, ERROR_FIELDS = tables(CARDAN).PARAM, tables(CARDAN).error_fields
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
+ARM_OF_PIN = [hole - 1 for hole in HOLE_OF_PIN]
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 MM = 1e-3
 
@@ -38,7 +41,7 @@ def operation():
 
 
 def one(**errors):
-    table = joints.nominal_errors(1)
+    table = joints.nominal_errors(1, CARDAN)
     for name, value in errors.items():
         table[name.replace("__", ".")] = value
     return table
@@ -195,7 +198,7 @@ def test_operation_is_validated():
 
 
 def test_nominal_joint(joint, operation):
-    p = joints.perturb(joint, operation, joints.nominal_errors(3))
+    p = joints.perturb(joint, operation, joints.nominal_errors(3, CARDAN))
     assert p.dtype == PARAM
     assert_allclose(p["alpha"], np.radians(15))
     assert_allclose(p["omega"], 500 * 2 * np.pi / 60)
@@ -262,7 +265,7 @@ def test_offsets_and_tilts_by_hand(joint, operation):
         ("hole4.tilt_z", -0.01): ("hole_axis", 0, [s, c, 0]),
         ("hole1.tilt_z", 0.01): ("hole_axis", 2, [c, s, 0]),
     }
-    nominal = joints.perturb(joint, operation, joints.nominal_errors(1))
+    nominal = joints.perturb(joint, operation, joints.nominal_errors(1, CARDAN))
     for (error, value), (field, index, expected) in by_hand.items():
         p = joints.perturb(joint, operation, one(**{error: value}))
         assert_allclose(p[field][0, index], expected, atol=1e-18, err_msg=error)
@@ -272,7 +275,7 @@ def test_offsets_and_tilts_by_hand(joint, operation):
 
 def test_all_features_against_finite_rotations(joint, operation):
     rng = np.random.default_rng(7)
-    errors = joints.nominal_errors(20)
+    errors = joints.nominal_errors(20, CARDAN)
     for f in ERROR_FIELDS:
         if f.name.startswith(("pin", "hole")):
             errors[f.name] = rng.normal(scale=0.3 if "tilt" in f.name else 1e-4, size=20)
@@ -288,7 +291,7 @@ def test_all_features_against_finite_rotations(joint, operation):
 
 def test_rows_do_not_see_each_other(joint, operation):
     rng = np.random.default_rng(8)
-    errors = joints.nominal_errors(9)
+    errors = joints.nominal_errors(9, CARDAN)
     for f in ERROR_FIELDS:
         if f.name.startswith("operation."):
             continue
@@ -378,7 +381,7 @@ def test_stations_without_sense_are_faults(contact, key, found):
 @pytest.mark.parametrize("n", [1, 2, 5, MAX_STATIONS])
 def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
     j = joints.load("cirelli2021", {"contact": {"law": "sliced", "n_stations": n}}, "case.toml")
-    p = joints.perturb(j, operation, joints.nominal_errors(1))[0]
+    p = joints.perturb(j, operation, joints.nominal_errors(1, CARDAN))[0]
     s, w = p["station_s"], p["station_weight"]
     assert p["n_stations"] == n
     assert_array_equal(s[n:], 0.0)
@@ -400,7 +403,7 @@ def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
     shares = {"cross1.F": 0.2, fork: 0.3, "pin1.contact": 0.1, "cross1.F at start": 0.4, "cross1.T": 0.0}
     rows = [{"load": load, "level": 700.0, "share": share} for load, share in shares.items()]
     other = {"load": "cross2.F", "level": 700.0, "share": 0.3}
-    shown = one_force([*rows, other, {**rows[0], "level": 800.0}], "level", "share")
+    shown = one_force([*rows, other, {**rows[0], "level": 800.0}], "level", "share", CARDAN)
     assert [(row["load"], row["level"], row["share"]) for row in shown] == [
         (f"cross1.F, {fork}, pin1.contact", 700.0, 0.3),
         ("cross1.F at start", 700.0, 0.4),

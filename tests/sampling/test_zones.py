@@ -10,10 +10,10 @@ import pytest
 from scipy import stats
 
 from tests.support.synthetic import HEAD
+from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import features
 from tolstat import sampling, study
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
 from tolstat.study import Study, axes
 from tolstat.study.tolerances.entry import meanings
@@ -50,6 +50,8 @@ def _std(errors: np.ndarray, name: str) -> float:
         ("normal", 0.1e-3 / 6 * np.sqrt(1 - 4.5 / np.expm1(4.5))),
     ],
 )
+
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 def test_moments_of_a_position(make: Make, kind: str, sigma: float) -> None:
     s = make('"pin1.' + POSITION.replace('"%s"', f'"{kind}"').replace('"1.5"', "1.5"))
     errors = sampling.draw(s)

@@ -21,7 +21,7 @@ from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import special
-from tolstat.common.loads import LOADS, FloatArray, Limit
+from tolstat.common.loads import FloatArray, Limit, load_of
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
@@ -243,7 +243,7 @@ def numerical(view: View, limit: Limit, last: NDArray[np.intp]) -> tuple[float, 
     """
     ends: list[list[FloatArray]] = [[], [], []]
     for name, level in zip(limit.loads, limit.levels, strict=True):
-        load = replace(Sample.of(LOADS[name].of(view.results), view.status, name=name), limit=level)
+        load = replace(Sample.of(load_of(name, view.mechanism).of(view.results), view.status, name=name), limit=level)
         known = error_budget.near(view, load)
         if known is None:
             return None

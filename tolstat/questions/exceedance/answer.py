@@ -228,7 +228,11 @@ def note(view: View) -> str:
 
 def _beyond(view: View) -> str:
     """Why the force without errors is smaller than T/(2 R); empty where it is not, or at several operating points."""
-    forces = [view.load(name).nominal for name in ("cross1.F", "cross2.F") if name in view.bushing_loads]
+    mechanism = view.mechanism
+    holes = {lump.name for lump in mechanism.lumps if lump.member == mechanism.shafts[-1].member}
+    pins = {pair.pin for pair in mechanism.pairs if pair.hole in holes}
+    names = [f"{bushing.name}.F" for bushing in mechanism.bushings if bushing.lump in pins]
+    forces = [view.load(name).nominal for name in names if name in view.bushing_loads]
     if not forces or len(view.points) > 1:
         return ""
     torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R

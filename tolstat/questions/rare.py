@@ -99,7 +99,7 @@ def simulate(
         raise InputError([Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"')])
     else:
         study = source.at(work.point).at("")
-        wanted = limit_of(limit, study.limits, "--limit", EXAMPLE)
+        wanted = limit_of(limit, study.limits, study.mechanism, "--limit", EXAMPLE)
         levels = dict(zip(wanted.loads, wanted.levels, strict=True))
         fields = {"load": wanted.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
         plan = subset_of(study, fields | ({} if seed is None else {"seed": seed}))

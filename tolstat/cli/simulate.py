@@ -285,15 +285,15 @@ def show(
     with gather(faults):
         check_target(target)
     raise_all(faults)
-    joint, own_alpha, title, own_errors = library.drawings.read(source, row, alpha)
+    joint, alphas, title, own_errors = library.drawings.read(source, row, alpha)
     if errors:
         figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()
     elif own_errors is not None:
-        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.views.numbers(joint, own_errors)
+        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.drawings.numbers(joint, own_errors)
     else:
         figure, rows = (
-            library.drawings.draw_joint(joint, own_alpha, title, columns),
-            library.drawings.lengths(joint, own_alpha),
+            library.drawings.draw_joint(joint, alphas, title, columns),
+            library.drawings.lengths(joint, alphas),
         )
     (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
     typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])

@@ -27,10 +27,10 @@ else:
     lines, markers, patches, ticker = (Late(f"matplotlib.{name}") for name in ("lines", "markers", "patches", "ticker"))
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
-"""Colours of the bushings of a group, see `curve`: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
+"""Colours of curves, see `curve`: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
 Dash = str | tuple[float, tuple[float, ...]]
 DASHES: tuple[Dash, ...] = ("-", (0.0, (6.0, 2.0)), (0.0, (3.0, 1.5)), (0.0, (1.2, 0.9)))
-"""Dashes of these: where curves coincide, the lower one shows through the gaps."""
+"""Dashes of curves: where curves coincide, the lower one shows through the gaps."""
 INK, FAINT = "#222222", "#777777"
 
 _DARK = {

@@ -7,7 +7,6 @@ from contextlib import suppress
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import accuracy as comparison
@@ -285,7 +284,8 @@ def accuracy(view: View) -> Answer:
         remedy = f"check some joints: tolstat verify {view.path}"
         raise inapplicable(view, "holds no checks of the numerical error", remedy)
     title = "Relative to the largest load of its kind in the joint"
-    table = Table("errors", title, ERRORS, error_rows(checks, view.mechanism), dict.fromkeys(("median", "usual", "worst"), "1"))
+    rows, unit = error_rows(checks, view.mechanism), dict.fromkeys(("median", "usual", "worst"), "1")
+    table = Table("errors", title, ERRORS, rows, unit)
     lead = Sentence(text.sentence(error_note(checks, view.mechanism, view.limits)), "lead")
     return Answer("accuracy", "Numerical error", [lead, table], {"numerical_error": view.numerical_error})
 
@@ -373,5 +373,5 @@ def in_percent(error: float) -> str:
 def _kept(verification: Verification, mechanism: Mechanism) -> dict[str, int]:
     """Loads that the campaign keeps, with their numbers in `accuracy.observables`; all if no joint has a value."""
     has_values = ~np.isnan(comparison.loads(verification.base, mechanism)).all(axis=0)
-    kept = has_values | ~has_values.any()
+    kept = np.asarray(has_values | ~has_values.any())
     return {name: k for k, name in enumerate(comparison.observables(mechanism)) if kept[k]}

@@ -112,7 +112,8 @@ def sheet(view: View) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group and kind; joints that did not settle are hollow, those without a result are crosses at the foot.
+        A panel for each group and kind; joints that did not settle are hollow, those without a result are crosses at
+        the foot.
     """
     axes, small = swept_axes(view), "largest modulus over the last revolution of each joint"
     if len(axes) > 1:
@@ -122,7 +123,8 @@ def sheet(view: View) -> Figure:
     if len(axes) > 2:
         small += f"; one line for each {', '.join(axis.label for axis in axes[2:])}"
     title = f"{view.name}: largest loads against {axes[0].label if axes else 'the number of the joint'}"
-    return drawing.sheet([_panel(view, *panel) for panel in panels(view.mechanism)], title, [view.head(), small], columns=2)
+    drawn = [_panel(view, *panel) for panel in panels(view.mechanism)]
+    return drawing.sheet(drawn, title, [view.head(), small], columns=2)
 
 
 def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
@@ -137,8 +139,8 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
     if len(axes) < 2:
         for i, name in enumerate(names_of(group, kind, view.mechanism)):
             if name in loads:
-                label = load_of(name, view.mechanism).place.name.replace(group, "bushing ")
-                _line(ax, view, first, loads[name], np.arange(view.n), **style.curve(i), label=label)
+                bushing = load_of(name, view.mechanism).place.name.replace(group, "bushing ")
+                _line(ax, view, first, loads[name], np.arange(view.n), **style.curve(i), label=bushing)
     else:
         largest, others = np.max(list(loads.values()), axis=0), np.column_stack([axis.values for axis in axes[1:]])
         values, shades = np.unique(axes[1].values), style.shades()

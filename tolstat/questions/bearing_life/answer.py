@@ -123,7 +123,8 @@ def bearing_life(view: View) -> Answer:
     parts.append(Table("loads", title, (bearing, *LOADS), loads, units, by_share(loads, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
-        parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
+        units = dict.fromkeys(list(contacts[0])[1:], "1")
+        parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
     facts: dict[str, Any] = {name: getattr(lives.bearing, name) for name in ("symbol", "critical_amplitude")}
     facts |= {name: getattr(lives, name) for name in ("unrated", "short", "fretting", "load_error")}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
@@ -236,8 +237,8 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
         all_pins = text.in_words(len(lives.pins))
         yield (
             f"{100.0 * bearing.reliability:g} % of equal joints reach their life {bearing.symbol} (C = "
-            f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; all {all_pins}: until the "
-            f"first of the {all_pins} bearings fails, Weibull slope 9/8"
+            f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; "
+            f"all {all_pins}: until the first of the {all_pins} bearings fails, Weibull slope 9/8"
         )
     if len(lives.duty) > 1:
         times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())

@@ -115,7 +115,8 @@ def begin_replay(view: View, asked: Asked) -> None:
         view.check_drawn()
         view.check()
         loads, (nominal, samples) = followed(view, view.leading), _evaluated(view, asked.replay)
-        if loads and len(samples) >= MIN_JOINTS and not revolutions.held(view.store, histories_of(loads, view.mechanism)):
+        has_enough, histories = len(samples) >= MIN_JOINTS, histories_of(loads, view.mechanism)
+        if loads and has_enough and not revolutions.held(view.store, histories):
             revolutions.ahead(view.store, np.concatenate([nominal, view.slots(samples)]), asked.processes)
 
 

@@ -264,7 +264,7 @@ def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
     rows = list[Row]()
     for before in views.joints_in(errors.dtype):
         own = views.numbers(joint, views.errors_in(errors, before))
-        rows += [row | {"feature": f"{before}{row['feature']}"} for row in own]
+        rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
     return rows
 
 

@@ -38,7 +38,8 @@ def sheet(view: View, notes: Sequence[str]) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group and kind, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
+        A panel for each group and kind, empty where no load is kept; share of the joints on a logarithmic axis down to
+        half a joint.
     """
     title = f"{view.name}: share of joints whose largest load exceeds x"
     return drawing.sheet([_group_panel(view, *panel) for panel in panels(view.mechanism)], title, notes, columns=2)

@@ -96,7 +96,8 @@ def equivalent_loads(loading: Counted) -> Rows:
         )
         lacking = cycles.truncation_bound(worst, m)
         for c, channel in enumerate(worst.channels):
-            head = {"channel": channel, "unit": unit_of(channel, loading.mechanism), "m": m, "nominal": only(nominal[:, c])}
+            unit = unit_of(channel, loading.mechanism)
+            head = {"channel": channel, "unit": unit, "m": m, "nominal": only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
             rows += _quantiles(head, values[:, c], loading)
     return rows
@@ -192,9 +193,13 @@ def leading(rows: Rows, mechanism: Mechanism) -> list[str]:
     """
     names, chosen = most_loaded(rows, mechanism), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
-    group_of = {row["channel"]: places(mechanism)[signals_of(row["channel"], mechanism)[0].place].group for row in candidates}
+    place_of = {name: signals_of(name, mechanism)[0].place for name in names}
     for group, kind in loads.panels(mechanism):
-        of_group = [row for row in candidates if row["unit"] == kind.unit and group_of[row["channel"]] == group]
+        of_group = [
+            row
+            for row in candidates
+            if row["unit"] == kind.unit and places(mechanism)[place_of[row["channel"]]].group == group
+        ]
         chosen += [max(of_group, key=lambda row: float(row["estimate"]))["channel"]] if of_group else []
     return chosen
 
@@ -230,9 +235,7 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     return pd.concat(frames, ignore_index=True)
 
 
-def _frame(
-    part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]], mechanism: Mechanism
-) -> pd.DataFrame:
+def _frame(part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]], mechanism: Mechanism) -> pd.DataFrame:
     joint, channel, cycle = np.nonzero((part.ranges > 0) & (part.repeats > 0))  # leaves out NaN
     units = [unit_of(name, mechanism) for name in part.channels]
     return pd.DataFrame(

@@ -6,10 +6,11 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from tolstat.common.columns import OPTIONAL_FIELDS, RESULT_COLUMNS
-from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.loads import LOADS, UNIT_OF_LIMIT
-from tolstat.common.tables import ERROR_FIELDS
+from tolstat.common import tables as of_rows
+from tolstat.common.cardan import CARDAN
+from tolstat.common.columns import optional_columns
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import loads_of, units_of_limits
 from tolstat.joint import Operation
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
 from tolstat.study import schema
@@ -156,7 +157,7 @@ def errors() -> str:
     """Table of the names of errors."""
     lines = ["| name | unit | meaning |", "|---|---|---|"]
     meanings: dict[tuple[str, str, str], list[str]] = {}
-    for field in ERROR_FIELDS:
+    for field in of_rows.tables(CARDAN).error_fields:
         feature, _, half = field.name.partition(".")
         text = field.description.replace("the pin's", "the").replace("the pin axis", "the axis")
         text = text.replace("the hole's", "the").replace("the hole axis", "the axis")
@@ -171,8 +172,8 @@ def errors() -> str:
 def loads() -> str:
     """Table of the loads that can have a limit."""
     lines = ["| load | unit | meaning |", "|---|---|---|"]
-    for of in LOAD_KINDS:
-        names = [name for name in UNIT_OF_LIMIT if LOADS[name].kind == of]
+    for of in kinds(CARDAN).values():
+        names = [name for name in units_of_limits(CARDAN) if loads_of(CARDAN)[name].kind == of]
         if not names:
             continue
         text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
@@ -183,9 +184,8 @@ def loads() -> str:
 def results() -> str:
     """Sentence with the names of the result columns that can be left out."""
     found: dict[str, list[str]] = {}
-    for column in RESULT_COLUMNS:
-        if column.field in OPTIONAL_FIELDS:
-            found.setdefault(column.field, []).append(column.name)
+    for column in optional_columns(CARDAN):
+        found.setdefault(column.field, []).append(column.name)
     return (
         "Columns: "
         + ", ".join(f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "") for names in found.values())

@@ -188,7 +188,7 @@ def test_files_are_written_before_the_answer_is_printed(tmp_path: Path, monkeypa
     def ended(*_: Any) -> None:
         raise BrokenPipeError
 
-    monkeypatch.setattr("tolstat.cli._command.deliver", ended)
+    monkeypatch.setattr("tolstat.cli._shared._print_parts", ended)
     done = call("change", made(tmp_path), "--set", "pin*.tilt_t.cpk=2", "--workers", 1, "--out", tmp_path / "x.toml")
     assert isinstance(done.exception, BrokenPipeError)
     assert "cpk = 2" in (tmp_path / "x.toml").read_text()

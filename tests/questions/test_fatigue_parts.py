@@ -18,8 +18,9 @@ from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.questions.fatigue import counting, parts
@@ -105,7 +106,7 @@ def point(line, name="a"):
 
 def test_stress_is_formed_before_cycles_are_counted(campaign):
     found = stresses(campaign())
-    settings = of_text(campaign().with_suffix(".toml").read_text(encoding="utf-8"), "a.toml")
+    settings = of_text(campaign().with_suffix(".toml").read_text(encoding="utf-8"), "a.toml", CARDAN)
     assert found.settings == settings
     assert found.cycles.channels == NAMES
     assert found.valid.any()
@@ -113,7 +114,7 @@ def test_stress_is_formed_before_cycles_are_counted(campaign):
     with ResultFile.open(campaign()) as store:
         loads = store.histories("loads", np.arange(store.n)).astype(float)
     for p, own in enumerate(settings.points):
-        at = loads[:, :, BUSHINGS.index(own.bushing)]
+        at = loads[:, :, kinds(CARDAN)["F"].places.index(own.bushing)]
         signal = {"weld": 2.5e3 * at[..., 2] - 2e5 * at[..., 3], "pin root": 2e5 * at[..., 4]}[own.name.split(",")[0]]
         for stressed, first in ((found.cycles, 1), (found.nominal, 0)):
             for i in range(len(stressed.low)):
@@ -244,12 +245,12 @@ point.b = { bushing = "cross1", T_tz = "2 MPa/Nm", F_e = "1 MPa/kN", M = 0.3, k 
 
 def bent(monkeypatch, moments, force=0.0, number=0):
     """Damage in a revolution of a point of `ROUND`, at moments about t and z over it, N m, and a force along e, N."""
-    loads = np.zeros((1, len(moments[0]), len(BUSHINGS), 6))
+    loads = np.zeros((1, len(moments[0]), len(CARDAN.bushings), 6))
     loads[0, :, 0, 0], loads[0, :, 0, 4], loads[0, :, 0, 5] = force, *moments
     monkeypatch.setattr(counting.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
-    settings = of_text(ROUND, "a.toml")
+    settings = of_text(ROUND, "a.toml", CARDAN)
     settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
-    found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points), kept=180)
+    found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points, CARDAN), kept=180)
     return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
 
 
@@ -363,7 +364,7 @@ def test_the_service_life_is_the_one_that_bearings_require(tmp_path):
         assert (settings.revolutions, settings.required) == (pytest.approx(expected), True)
         assert settings.service_life == life
     with pytest.raises(InputError, match=r"fatigue\.starts: 10000 starts in 1000 revolutions"):
-        Fatigue(starts=1e4).within(1.0, 1000.0, "a.toml")
+        Fatigue(starts=1e4).within(1.0, 1000.0, "a.toml", CARDAN)
 
 
 def test_every_fault_of_the_points_is_told():
@@ -380,7 +381,7 @@ def test_every_fault_of_the_points_is_told():
     point.g = 3
     """
     with pytest.raises(InputError) as error:
-        of_text(text, "a.toml")
+        of_text(text, "a.toml", CARDAN)
     found = {fault.place.removeprefix("a.toml: fatigue"): fault.found for fault in error.value.faults}
     assert list(found) == [
         *(".starts", ".point.a.bushing", ".point.b", ".point.c.T_e", ".point.d", ".point.e"),
@@ -389,7 +390,7 @@ def test_every_fault_of_the_points_is_told():
     assert "has both S_D and S_aD" in found[".point.d"]
     assert "has neither T_S nor T_N" in found[".point.e"]
     with pytest.raises(InputError, match=r"fatigue\.point: 3"):
-        of_text("[fatigue]\npoint = 3", "a.toml")
+        of_text("[fatigue]\npoint = 3", "a.toml", CARDAN)
 
 
 @pytest.mark.slow

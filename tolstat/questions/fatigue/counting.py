@@ -269,7 +269,7 @@ def _counted(
         apart = max(apart, difference)
         for joint in range(len(loads[BUSHING_LOADS])):
             own = {name: values[joint] for name, values in loads.items()}
-            ranges, means, number = histories.count(own, signals, kept)
+            ranges, means, number = histories.count(own, signals, kept, store.mechanism)
             table = np.stack([ranges, means], axis=-1)[None, :, : max(1, int(number.max(initial=0)))]
             finite = all(np.isfinite(values).all() for values in own.values())  # else it failed, simulated again
             tables.append(table if finite else np.full_like(table, np.nan))

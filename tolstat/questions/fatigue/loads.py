@@ -193,13 +193,9 @@ def leading(rows: Rows, mechanism: Mechanism) -> list[str]:
     """
     names, chosen = most_loaded(rows, mechanism), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
-    place_of = {name: signals_of(name, mechanism)[0].place for name in names}
+    place_of = {name: places(mechanism)[signals_of(name, mechanism)[0].place] for name in names}
     for group, kind in loads.panels(mechanism):
-        of_group = [
-            row
-            for row in candidates
-            if row["unit"] == kind.unit and places(mechanism)[place_of[row["channel"]]].group == group
-        ]
+        of_group = [row for row in candidates if row["unit"] == kind.unit and place_of[row["channel"]].group == group]
         chosen += [max(of_group, key=lambda row: float(row["estimate"]))["channel"]] if of_group else []
     return chosen
 

@@ -21,7 +21,7 @@ from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
-from tolstat.study.selection import TOLERANCED
+from tolstat.study.selection import toleranced_units
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -129,7 +129,7 @@ def _joint_sections(made: Mapping[str, Any], before: str) -> Iterator[str]:
 def distributions() -> Iterator[str]:
     """Entries of [tolerances], one after another."""
     of: dict[str, tuple[Any, list[str]]] = {}
-    for name in TOLERANCED:
+    for name in toleranced_units(CARDAN):
         if name.partition(".")[2] in ZONES:
             continue
         for word, model in kinds_of(name).items():
@@ -140,7 +140,7 @@ def distributions() -> Iterator[str]:
         own = {key: v for key, v in made["properties"].items() if key not in told}
         band = [f"`{key}`" for key in BAND if key in made["properties"]]
         text = f"#### `{word}`\n\n{made['description']}"
-        if len(names) < len(TOLERANCED) / 2:
+        if len(names) < len(toleranced_units(CARDAN)) / 2:
             text += f" For {', '.join(f'`{key}`' for key in dict.fromkeys(n.partition('.')[2] for n in names))} only."
         text += f" Band: {', '.join(band)}." if band else ""
         yield text + (f"\n\n{key_table(own, made['required'])}" if own else "")

@@ -40,7 +40,7 @@ def test_loads_come_back(path: Path, tmp_path: Path, caplog: pytest.LogCaptureFi
     caplog.set_level(logging.INFO, "tolstat")
     study = load(path)
     run(study, tmp_path / "a.h5", workers=1, check=False, rows=ROWS)
-    loads = [name for name, load in loads_of(CARDAN).items() if holds(study.output.columns, load)]
+    loads = [name for name, load in loads_of(CARDAN).items() if holds(study.columns, load)]
     for point in study.points:
         export(tmp_path / "a.h5", joints=str(tmp_path / "x.csv"), nominal=True, point=point.name or None)
         evaluate(path, errors=tmp_path / "x.csv", out=str(tmp_path / "y.csv"), point=point.name, loads=loads, workers=1)

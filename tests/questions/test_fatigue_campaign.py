@@ -345,7 +345,7 @@ def test_every_fault_of_the_section_is_told():
         },
     }
     with pytest.raises(InputError) as error:
-        of_text(as_text({"fatigue": section}), "a.toml", CARDAN)
+        of_text(as_text({"fatigue": section}), "a.toml")
     places = [fault.place.removeprefix("a.toml: fatigue.") for fault in error.value.faults]
     assert places == [
         *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.X"),
@@ -353,7 +353,7 @@ def test_every_fault_of_the_section_is_told():
     ]
     lines = {key: {"m": 3, "S0": "1 N", "N0": 1} for key in ("*.F_z", "fork1.F_z")}
     with pytest.raises(InputError, match="is set by"):
-        of_text(as_text({"fatigue": {"line": lines}}), "a.toml", CARDAN)
+        of_text(as_text({"fatigue": {"line": lines}}), "a.toml")
 
 
 def test_the_frame_for_pylife_holds_every_cycle(campaign):

@@ -106,7 +106,7 @@ def point(line, name="a"):
 
 def test_stress_is_formed_before_cycles_are_counted(campaign):
     found = stresses(campaign())
-    settings = of_text(campaign().with_suffix(".toml").read_text(encoding="utf-8"), "a.toml", CARDAN)
+    settings = of_text(campaign().with_suffix(".toml").read_text(encoding="utf-8"), "a.toml")
     assert found.settings == settings
     assert found.cycles.channels == NAMES
     assert found.valid.any()
@@ -248,7 +248,7 @@ def bent(monkeypatch, moments, force=0.0, number=0):
     loads = np.zeros((1, len(moments[0]), len(CARDAN.bushings), 6))
     loads[0, :, 0, 0], loads[0, :, 0, 4], loads[0, :, 0, 5] = force, *moments
     monkeypatch.setattr(counting.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
-    settings = of_text(ROUND, "a.toml", CARDAN)
+    settings = of_text(ROUND, "a.toml")
     settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
     found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points, CARDAN), kept=180)
     return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
@@ -364,7 +364,7 @@ def test_the_service_life_is_the_one_that_bearings_require(tmp_path):
         assert (settings.revolutions, settings.required) == (pytest.approx(expected), True)
         assert settings.service_life == life
     with pytest.raises(InputError, match=r"fatigue\.starts: 10000 starts in 1000 revolutions"):
-        Fatigue(starts=1e4).within(1.0, 1000.0, "a.toml", CARDAN)
+        Fatigue(starts=1e4).within(1.0, 1000.0, "a.toml")
 
 
 def test_every_fault_of_the_points_is_told():
@@ -381,7 +381,7 @@ def test_every_fault_of_the_points_is_told():
     point.g = 3
     """
     with pytest.raises(InputError) as error:
-        of_text(text, "a.toml", CARDAN)
+        of_text(text, "a.toml")
     found = {fault.place.removeprefix("a.toml: fatigue"): fault.found for fault in error.value.faults}
     assert list(found) == [
         *(".starts", ".point.a.bushing", ".point.b", ".point.c.T_e", ".point.d", ".point.e"),
@@ -390,7 +390,7 @@ def test_every_fault_of_the_points_is_told():
     assert "has both S_D and S_aD" in found[".point.d"]
     assert "has neither T_S nor T_N" in found[".point.e"]
     with pytest.raises(InputError, match=r"fatigue\.point: 3"):
-        of_text("[fatigue]\npoint = 3", "a.toml", CARDAN)
+        of_text("[fatigue]\npoint = 3", "a.toml")
 
 
 @pytest.mark.slow

@@ -335,7 +335,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         kept_names |= set(names)
     every, found = scaling.tolerances(study), list[ladder.Ladder]()
     with gather(faults):
-        found += ladder.ladders(study, every, prices.of(every, costs))
+        found += ladder.ladders(study, every, prices.of(every, study.mechanism, costs))
     raise_all(faults)
     free = [own for own in found if len(own.rungs) > 1 and not kept_names & set(own.line.names)]
     if not free:

@@ -151,7 +151,7 @@ def rare(*views: View, delivery: Delivery = prediction.DELIVERY) -> Answer:
     StoreError
         When a file is none of a subset simulation, or it is not finished.
     """
-    limits = {subset.Subsets(_plan_of(view)).settings.limit for view in views}
+    limits = {subset.Subsets(_plan_of(view)).settings.limit(view.mechanism) for view in views}
     if len(limits) != 1:
         remedy = "give files of one simulation, which differ in the seed alone"
         raise InputError([Fault(", ".join(str(view.path) for view in views), "are of several limits", remedy)])
@@ -205,7 +205,8 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
         unresolved.append(subsets.take(store))
     estimate, wide = walk.estimate(), walk.estimate(prediction.half(CONFIDENCE))
     p, deviation = estimate.probability, estimate.deviation
-    factors = numerical(view, settings.limit, walk.last)
+    limit = settings.limit(view.mechanism)
+    factors = numerical(view, limit, walk.last)
     low, high = factors or (1.0, 1.0)
     ends = prediction.of_share(wide.lower * low, min(1.0, wide.upper * high), delivery, CONFIDENCE)
     row = {"file": view.path.name, "seed": settings.seed, "reached": walk.reached} | estimate._asdict()
@@ -217,7 +218,7 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     row["next_lower"], row["next_upper"] = ends
     levels, probability = [], 1.0
     for number, level in enumerate(walk.levels):
-        head = {"seed": settings.seed, "load": settings.limit.name, "unit": settings.limit.unit, "level": number}
+        head = {"seed": settings.seed, "load": limit.name, "unit": limit.unit, "level": number}
         levels.append(head | {"threshold": level.threshold, "probability": probability} | level._asdict())
         probability *= level.share
     return row, levels

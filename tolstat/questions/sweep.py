@@ -26,7 +26,7 @@ from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
 from tolstat.study.design import KEYS
-from tolstat.study.selection import UNITS
+from tolstat.study.selection import error_units
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
@@ -219,7 +219,10 @@ def swept_axes(view: View) -> list[Axis]:
     columns = {(field.name, field.unit): errors[field.name] for field in tables(view.mechanism).error_fields}
     if len(view.parts) == 1:  # of several operating points none is swept
         points = recorded.operating_points(view.store, slice(view.store.first_sample, None))
-        columns |= {(f"operation.{key}", UNITS[f"operation.{key}"]): values for key, values in points.items()}
+        columns |= {
+            (f"operation.{key}", error_units(view.mechanism)[f"operation.{key}"]): values
+            for key, values in points.items()
+        }
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}

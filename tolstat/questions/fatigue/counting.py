@@ -141,7 +141,7 @@ def section(view: View) -> Fatigue:
     Of the text in the file the section alone is read, like limits: it is at hand even where the study refers to files
     that are not.
     """
-    return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path), view.mechanism)
+    return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
 
 
 def only(values: FloatArray) -> float:

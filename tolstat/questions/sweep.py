@@ -219,10 +219,8 @@ def swept_axes(view: View) -> list[Axis]:
     columns = {(field.name, field.unit): errors[field.name] for field in tables(view.mechanism).error_fields}
     if len(view.parts) == 1:  # of several operating points none is swept
         points = recorded.operating_points(view.store, slice(view.store.first_sample, None))
-        columns |= {
-            (f"operation.{key}", error_units(view.mechanism)[f"operation.{key}"]): values
-            for key, values in points.items()
-        }
+        units = error_units(view.mechanism)
+        columns |= {(name, units[name]): of for key, of in points.items() if (name := f"operation.{key}")}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}

@@ -220,7 +220,7 @@ def swept_axes(view: View) -> list[Axis]:
     if len(view.parts) == 1:  # of several operating points none is swept
         points = recorded.operating_points(view.store, slice(view.store.first_sample, None))
         units = error_units(view.mechanism)
-        columns |= {(name, units[name]): of for key, of in points.items() if (name := f"operation.{key}")}
+        columns |= {(f"operation.{key}", units[f"operation.{key}"]): of for key, of in points.items()}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}

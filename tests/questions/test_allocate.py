@@ -35,7 +35,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Campaign with a finished search; not to be written."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blocks, "simulate_rows", stand_in)
-        patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+        patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
         path = made(tmp_path_factory.mktemp("allocate"), WHOLE)
         simulated(path)
     return path

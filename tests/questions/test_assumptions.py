@@ -87,7 +87,7 @@ def made(folder, text=TEXT, solver=stand_in):
 
 def stand_in_with(patch, **effects):
     patch.setattr(blocks, "simulate_rows", partial(stand_in, **effects))
-    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def loaded(folder, text=TEXT):
 
 def stand_in_with(patch):
     patch.setattr(blocks, "simulate_rows", stand_in)
-    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
     patch.setattr(runner, "FIRST", 512)
     patch.setattr(runner, "MOST", 1024)
 

@@ -31,7 +31,7 @@ NOTHING = "hole1.tilt_t={ plus_minus = '0.1 deg', distribution = 'normal' }"
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The stand-in takes the place of the solver, in this process."""
     monkeypatch.setattr(blocks, "simulate_rows", stand_in)
-    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
 
 
 def made(folder: Path, text: str = TEXT, name: str = "made", solver: Callable[..., Any] = stand_in) -> Path:

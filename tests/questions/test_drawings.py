@@ -19,9 +19,8 @@ from tests.support.mechanisms import triads
 from tolstat import joint as joints
 from tolstat.cli import app
 from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
-from tolstat.common.load_kinds import PINS
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import HOLES
+from tolstat.common.loads import loads_of
+from tolstat.common.mechanism import features
 from tolstat.display import drawing
 from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors, perturb
@@ -32,6 +31,7 @@ from tolstat.store import ResultFile
 
 ALPHA = 0.3
 OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 SLIM = {
     "cross": {"R": "40 mm", "r_b": "20 mm"},
     "pin": {"l": "25 mm", "d": "18 mm"},
@@ -129,9 +129,9 @@ def kinds(cirelli):
 def test_an_error_is_drawn_in_the_sense_that_perturb_gives_it(cirelli, kinds, kind, name):
     """A small positive error of pin 1 or hole 4, in axes of its frame, against the drawing with and without it."""
     feature = {"pin": "pin1", "hole": "hole4"}[name]
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     errors[f"{feature}.{kind}"] = 1e-5
-    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1)))
+    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1, CARDAN)))
     part = f"{feature}.2" if name == "hole" else feature
     moved, ideal = (kinds[f"{kind}.{state}.{part}"] for state in ("moved", "ideal"))
     if kind == "diameter":
@@ -149,7 +149,7 @@ def test_an_error_is_drawn_in_the_sense_that_perturb_gives_it(cirelli, kinds, ki
 
 
 def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_errors):
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
     par, z = perturb(cirelli, OPERATION, errors)[0], cirelli.contact.z
@@ -174,7 +174,7 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    panel = views.errors_of(fitting, nominal_errors(1), "", "row")
+    panel = views.errors_of(fitting, nominal_errors(1, CARDAN), "", "row")
     assert "enlarged 1 times" in panel.description
     assert drawn(panel)
 
@@ -209,7 +209,7 @@ def test_labels_are_inside_and_apart(over, alpha):
 @pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
 def test_labels_of_errors_are_inside_and_apart(over, random_errors):
     joint = joints.load("cirelli2021", over, "test")
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     for name, value in random_errors(6).items():
         errors[name.replace("__", ".")] = value
     for panel in (
@@ -286,7 +286,7 @@ def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
         view, asked = store.view(), Asked(store.path)
         marked = answer.place_of(view, "fork2.T", asked)
         joint, _, part, _ = answer.drawings(view).parts
-        worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
+        worst = {int(view.rows(int(np.argmax(loads_of(CARDAN)[name].of(view.results))))) for name in view.leading}
     places = {name.partition(".")[0] for name in view.leading} - {"psi"}
     assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
     assert "Marked: fork2." in marked.description
@@ -303,4 +303,4 @@ def test_figures_of_the_package(cirelli):
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
     assert tolstat.draw_errors is answer.draw_errors
-    assert len(tolstat.draw_row(cirelli, nominal_errors(1), "one").axes) == 1
+    assert len(tolstat.draw_row(cirelli, nominal_errors(1, CARDAN), "one").axes) == 1

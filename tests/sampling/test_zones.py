@@ -10,14 +10,15 @@ import pytest
 from scipy import stats
 
 from tests.support.synthetic import HEAD
-from tolstat.common.cardan import CARDAN
-from tolstat.common.mechanism import features
 from tolstat import sampling, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
+from tolstat.common.mechanism import features
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
 from tolstat.study import Study, axes
 from tolstat.study.tolerances.entry import meanings
 
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 OVER = 22e-3
 POSITION = 'position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "%s" }\n'
 DIRECTION = '%s" = { zone = "⌀0.04 mm", over = "20 mm", distribution = "%s" }\n'
@@ -50,8 +51,6 @@ def _std(errors: np.ndarray, name: str) -> float:
         ("normal", 0.1e-3 / 6 * np.sqrt(1 - 4.5 / np.expm1(4.5))),
     ],
 )
-
-PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 def test_moments_of_a_position(make: Make, kind: str, sigma: float) -> None:
     s = make('"pin1.' + POSITION.replace('"%s"', f'"{kind}"').replace('"1.5"', "1.5"))
     errors = sampling.draw(s)

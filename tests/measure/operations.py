@@ -103,13 +103,13 @@ def count(snapshot: Snapshot) -> dict[str, int]:
     """
     from tolstat.common.cardan import CARDAN
     from tolstat.common.tables import Options
+    from tolstat.kernel.mechanics import cardan as of_joint
     from tolstat.kernel.mechanics import contact as contacts
     from tolstat.kernel.mechanics import dynamics, linsolve, rotation, tangent
     from tolstat.kernel.mechanics import motion as motions
-    from tolstat.kernel.mechanics.cardan import motion as of_joint
     from tolstat.kernel.mechanics.work import work_fields
 
-    for module in (contacts, dynamics, motions, of_joint, rotation):
+    for module in (of_joint, contacts, dynamics, motions, rotation):
         vars(module)["math"] = _counting_math()
     row = snapshot.params[0]
     par = SimpleNamespace(

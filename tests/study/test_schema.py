@@ -8,6 +8,7 @@ import re
 import tomllib
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import jsonschema
@@ -205,8 +206,9 @@ def readable(field: FieldInfo, example: object) -> bool:
     """Whether an example of a key can be read, as a value for an error that is a length or an angle."""
     adapter: TypeAdapter[Any] = TypeAdapter(Annotated[field.annotation, *field.metadata, None])
     for unit in ("m", "rad"):
+        site = Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")
         with suppress(ValidationError):
-            adapter.validate_python(example, context={"site": Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")})
+            adapter.validate_python(example, context={"site": site, "tolerance": SimpleNamespace(site=site, mark="")})
             return True
     return False
 

@@ -1,29 +1,25 @@
 """How large is the numerical error of a campaign? Compare its joints with the same joints under other settings.
 
 Errors are relative to the largest load of the kind in the joint, or of the kind that measures it (`Kind.measure`): a
-force to the largest ``|F|`` of its eight bushings, a torque to the largest ``|T|``, a contact force to the largest one
-of the four pins, Psi to itself. Loads that a campaign does not store are NaN in all of its joints and are left out of
+force to the largest ``|F|`` of its bushings, a torque to the largest ``|T|``, a contact force to the largest one of all
+pins, Psi to itself. Loads that a campaign does not store are NaN in all of its joints and are left out of
 these maxima; without any load of its measure, a load is relative to the largest of its own kind.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import half_width
-from tolstat.common.load_kinds import LOAD_KINDS, SPAN, Kind, measure_of
-from tolstat.common.loads import LOADS, FloatArray, Results, of_kind
+from tolstat.common.load_kinds import Kind, kinds, measure_of
+from tolstat.common.loads import FloatArray, Results, load_of, of_kind
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import SIMULATED, Status
-
-OBSERVABLES = tuple(name for kind in LOAD_KINDS for _, name in kind.loads())
-"""Largest loads of a joint whose error is evaluated: all that can have a limit, kind by kind."""
-_KEYS = tuple(SPAN)
-KIND_OF = np.array([_KEYS.index(LOADS[name].kind.key) for name in OBSERVABLES])
-"""Number of the kind of each, in the order of the registry."""
 
 REFERENCE, FIDELITY = "reference", "fidelity"
 HALF_STEP_SHARE = 4 / 3
@@ -52,9 +48,22 @@ class Spread(NamedTuple):
     worst: float
 
 
-def loads(results: NDArray[np.void]) -> FloatArray:
-    """Collect the largest loads of joints, (m,) table RESULT, as (m, loads): SI, in the order of `OBSERVABLES`."""
-    return np.concatenate([of_kind(results, kind) for kind in LOAD_KINDS], axis=1)
+@cache
+def observables(mechanism: Mechanism) -> tuple[str, ...]:
+    """Largest loads of a joint whose error is evaluated: all that can have a limit, kind by kind."""
+    return tuple(name for kind in kinds(mechanism).values() for _, name in kind.loads())
+
+
+@cache
+def _number_of_kind(mechanism: Mechanism) -> NDArray[np.intp]:
+    """Number of the kind of each of the `observables`, in the order of the registry."""
+    keys = list(kinds(mechanism))
+    return np.array([keys.index(load_of(name, mechanism).kind.key) for name in observables(mechanism)])
+
+
+def loads(results: NDArray[np.void], mechanism: Mechanism) -> FloatArray:
+    """Collect the largest loads of joints, (m,) table RESULT, as (m, loads): SI, in the order of `observables`."""
+    return np.concatenate([of_kind(results, kind) for kind in kinds(mechanism).values()], axis=1)
 
 
 def size(results: Results, kind: Kind) -> FloatArray:
@@ -69,23 +78,26 @@ def _largest(values: FloatArray) -> FloatArray:
     return values[:, known].max(axis=1) if known.any() else np.full(len(values), np.nan)
 
 
-def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
+def differences(base: NDArray[np.void], other: NDArray[np.void], mechanism: Mechanism) -> FloatArray:
     """Difference of `base` and `other`, relative to the largest load of the measure in `other`.
 
     Parameters
     ----------
     base, other : ndarray of RESULT, shape (m,)
         The same joints, simulated in two ways.
+    mechanism : Mechanism
+        What was simulated.
 
     Returns
     -------
     ndarray, shape (m, loads)
-        `base` less `other`, in the order of `OBSERVABLES`; NaN where a joint is not settled in `base` or has no
+        `base` less `other`, in the order of `observables`; NaN where a joint is not settled in `base` or has no
         results in `other`.
     """
-    sizes = np.column_stack([size(other, kind) for kind in LOAD_KINDS])[:, KIND_OF]
+    sizes = np.column_stack([size(other, kind) for kind in kinds(mechanism).values()])[:, _number_of_kind(mechanism)]
+    changed = loads(base, mechanism) - loads(other, mechanism)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where(sizes == 0, 0.0, (loads(base) - loads(other)) / sizes)
+        relative = np.where(sizes == 0, 0.0, changed / sizes)
     relative[(base["status"] != Status.OK) | ~np.isin(other["status"], SIMULATED)] = np.nan
     return np.asarray(relative)
 
@@ -112,7 +124,7 @@ def estimate(changes: Mapping[str, FloatArray]) -> FloatArray:
     return np.asarray(sum(others, steps))
 
 
-def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> FloatArray:
+def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]], mechanism: Mechanism) -> FloatArray:
     """Numerical error of joints, fidelity included: measured where the reference settled, estimated otherwise.
 
     Returns
@@ -120,11 +132,11 @@ def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) ->
     ndarray, shape (m, loads)
         Relative, not negative; NaN where neither is available.
     """
-    changes = {name: differences(base, results) for name, results in checks.items()}
+    changes = {name: differences(base, results, mechanism) for name, results in checks.items()}
     return np.abs(_measured_or(estimate(changes), changes, checks))
 
 
-def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> FloatArray:
+def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]], mechanism: Mechanism) -> FloatArray:
     """What the largest loads lack, with its sign: to be added to them, relative to the largest load of the kind.
 
     Parameters
@@ -133,6 +145,8 @@ def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) 
         Joints as the campaign simulated them.
     checks : mapping of str to ndarray of RESULT, shape (m,)
         The same joints in each check.
+    mechanism : Mechanism
+        What was simulated.
 
     Returns
     -------
@@ -140,7 +154,7 @@ def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) 
         Difference to the reference where that settled; otherwise the sum of the changes under half the step
         (extrapolated), the smaller tolerances, and dynamic fidelity. NaN where neither is known.
     """
-    changes = {name: -differences(base, results) for name, results in checks.items()}
+    changes = {name: -differences(base, results, mechanism) for name, results in checks.items()}
     changed = HALF_STEP_SHARE * changes["half_step"]
     for name in ("newton", "settling", FIDELITY):
         changed = changed + changes.get(name, 0.0)
@@ -191,15 +205,16 @@ def corrected(
     return values + sizes * (drawn - margin), values + sizes * (drawn + margin)
 
 
-def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> dict[str, float]:
+def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]], mechanism: Mechanism) -> dict[str, float]:
     """Numerical error that the share `USUAL` of the joints stays below, by kind of load; NaN if unknown."""
-    values = by_kind(numerical(base, checks))
-    return {kind: spread(values[:, k]).usual for k, kind in enumerate(_KEYS)}
+    values = by_kind(numerical(base, checks, mechanism), mechanism)
+    return {kind: spread(values[:, k]).usual for k, kind in enumerate(kinds(mechanism))}
 
 
-def by_kind(errors: FloatArray) -> FloatArray:
+def by_kind(errors: FloatArray, mechanism: Mechanism) -> FloatArray:
     """Largest error of each kind in each joint, (m, loads) -> (m, kinds); NaN as in `_largest`."""
-    return np.column_stack([_largest(np.abs(errors[:, kind == KIND_OF])) for kind in range(len(_KEYS))])
+    kind_of = _number_of_kind(mechanism)
+    return np.column_stack([_largest(np.abs(errors[:, kind == kind_of])) for kind in range(len(kinds(mechanism)))])
 
 
 def spread(errors: FloatArray) -> Spread:

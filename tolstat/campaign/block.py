@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.pool import Lost, Work
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import PARAM, VALID, HistorySpec, Options, Simulation, Status, without_results
+from tolstat.common.loads import load_of
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import VALID, HistorySpec, Options, Simulation, Status, tables, without_results
 
 
 class Block(NamedTuple):
@@ -27,12 +28,15 @@ class Block(NamedTuple):
         Their parameters.
     options : Options
         Their solver options.
+    mechanism : Mechanism
+        What they are.
     """
 
     point: str
     slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
+    mechanism: Mechanism
 
     def split(self) -> list[Block]:
         """Split into halves; a block of one joint is its only piece."""
@@ -52,10 +56,10 @@ BlockWork = Work[Block, Timed | Lost]
 """How a worker simulates a block."""
 
 
-def load_kernels(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
+def load_kernels(warm_up: Callable[..., object], options: Iterable[Options], mechanism: Mechanism) -> None:
     """Load what joints with any of the options need."""
     for each in options:
-        warm_up(each)
+        warm_up(each, mechanism=mechanism)
 
 
 def simulate_block(
@@ -67,20 +71,22 @@ def simulate_block(
 ) -> Timed:
     """Simulate the joints of a block and measure the time; those whose parameters are not finite get INVALID_INPUT."""
     begin = time.perf_counter()
-    fields = [block.params[name].reshape(len(block.params), -1) for name in PARAM.names or ()]
+    mechanism = block.mechanism
+    fields = [block.params[name].reshape(len(block.params), -1) for name in tables(mechanism).PARAM.names or ()]
     good = np.isfinite(np.concatenate(fields, axis=1)).all(axis=1)
-    whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
+    whole = without_simulation(len(good), Status.INVALID_INPUT, specs, mechanism)
     if good.any():
-        part = simulate(block.params[good], block.options, histories=histories, n_harmonics=n_harmonics)
+        kept = {"histories": histories, "n_harmonics": n_harmonics}
+        part = simulate(block.params[good], block.options, mechanism=mechanism, **kept)
         whole.results[good] = part.results
         for name, values in part.histories.items():
             whole.histories[name][good] = values
     return Timed(whole, time.perf_counter() - begin)
 
 
-def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
+def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec], mechanism: Mechanism) -> Simulation:
     """Return what the file stores for `n` joints that have no results: the given status and NaN."""
-    return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
+    return Simulation(without_results(n, status, mechanism), {name: spec.blank(n) for name, spec in specs.items()})
 
 
 def spread(rows: int, count: int) -> NDArray[np.intp]:
@@ -88,14 +94,14 @@ def spread(rows: int, count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, rows - 1, min(count, rows)).astype(np.intp))
 
 
-def loads_of(results: NDArray[np.void], names: Sequence[str]) -> NDArray[np.float64]:
+def loads_of(results: NDArray[np.void], names: Sequence[str], mechanism: Mechanism) -> NDArray[np.float64]:
     """Loads of joints, (m, loads), SI, NaN where a joint is not valid; from a table RESULT, (m,)."""
-    loads = np.column_stack([LOADS[name].of(results) for name in names])
+    loads = np.column_stack([load_of(name, mechanism).of(results) for name in names])
     return np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
 
 
 def results_of(block: Block, result: Timed | Lost) -> NDArray[np.void]:
     """Return the results of a block, (m,) table RESULT; without numbers if it was given up."""
     if isinstance(result, Lost):
-        return without_results(len(block.slots), Status.CRASHED)
+        return without_results(len(block.slots), Status.CRASHED, block.mechanism)
     return result.simulation.results

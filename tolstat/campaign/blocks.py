@@ -24,6 +24,7 @@ from tolstat.campaign.block import (
 from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Simulation, Status, from_names, without_results
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
@@ -87,9 +88,10 @@ class Pace:
         self.size = max(1, min(MAX_BLOCK, round(step)))
 
 
-def _work(options: list[Options], *kept: Any) -> BlockWork:
+def _work(mechanism: Mechanism, options: list[Options], *kept: Any) -> BlockWork:
     """How a worker simulates blocks with these options and histories."""
-    return Work(partial(simulate_block, simulate_rows, *kept), Block.split, partial(load_kernels, warm_up, options))
+    load = partial(load_kernels, warm_up, options, mechanism)
+    return Work(partial(simulate_block, simulate_rows, *kept), Block.split, load)
 
 
 def simulate_pending(
@@ -118,7 +120,8 @@ def simulate_pending(
         return
     pace = Pace(todo, workers, block)
     kept = study.output.histories, study.output.harmonics, store.history_specs
-    work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
+    work = _work(study.mechanism, settings_in_use(study, store), *kept)
+    blocks = _blocks(study, store, stop_slot, pace)
     if executor == "dask":
         results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
@@ -126,7 +129,7 @@ def simulate_pending(
     with closing(results):
         for done, result in results:
             if isinstance(result, Lost):
-                blank = without_simulation(len(done.slots), Status.CRASHED, store.history_specs)
+                blank = without_simulation(len(done.slots), Status.CRASHED, store.history_specs, done.mechanism)
                 yield done, blank, result.reason
             else:
                 begin = time.perf_counter()
@@ -135,20 +138,20 @@ def simulate_pending(
                 pace.note(len(done.slots), result.seconds, time.perf_counter() - begin)
 
 
-def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
+def simulate_beside(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
-    compile_missing(options)
-    results = without_results(len(params), Status.PENDING)
-    whole = Block("", np.arange(len(params)), params, options)
-    with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
+    compile_missing(mechanism, options)
+    results = without_results(len(params), Status.PENDING, mechanism)
+    whole = Block("", np.arange(len(params)), params, options, mechanism)
+    with closing(pool.map_blocks(work_beside(mechanism, options), [whole], 1)) as done:
         for block, result in done:
             results[block.slots] = results_of(block, result)
     return Simulation(results, {})
 
 
-def work_beside(*options: Options) -> BlockWork:
+def work_beside(mechanism: Mechanism, *options: Options) -> BlockWork:
     """Return how a worker simulates blocks with any of these options, without histories."""
-    return _work([*options], "none", 0, {})
+    return _work(mechanism, [*options], "none", 0, {})
 
 
 def settings_in_use(study: Study, store: Reader) -> list[Options]:
@@ -162,10 +165,10 @@ def _each_settings(study: Study, store: Reader) -> list[Options]:
     return variants + [from_names(retry["options"]) for retry in store.retries]
 
 
-def compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
+def compile_missing(mechanism: Mechanism, options: Options, params: NDArray[np.void] | None = None) -> None:
     """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
-    if not is_compiled(options, params):
-        warm_up(options, params)
+    if not is_compiled(options, params, mechanism=mechanism):
+        warm_up(options, params, mechanism=mechanism)
 
 
 def compile_for(study: Study, store: Reader) -> None:
@@ -175,7 +178,7 @@ def compile_for(study: Study, store: Reader) -> None:
     errors = store.errors(slice(0, first))[slots]
     each = [perturbed(study.at(at_point.point or ""), at_point.row(slots), errors) for at_point in store.each()]
     for options in settings_in_use(study, store):
-        compile_missing(options, np.concatenate(each))
+        compile_missing(study.mechanism, options, np.concatenate(each))
 
 
 def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:
@@ -193,4 +196,4 @@ def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator
             while left.size:
                 some, left = np.split(left, [pace.take(left.size)])
                 params = perturbed(studies[point], store.row(some), errors[some - slots[0]])
-                yield Block(point, some, params, distinct[number])
+                yield Block(point, some, params, distinct[number], study.mechanism)

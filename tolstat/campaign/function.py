@@ -19,13 +19,13 @@ from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, input_error, raise_all
-from tolstat.common.loads import SHOWN_LOADS, UNIT_OF_LOAD
+from tolstat.common.loads import shown_loads, units_of_loads
 from tolstat.common.tables import Options
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
 from tolstat.study import Study, axes
-from tolstat.study.selection import UNITS, select, suggestion
+from tolstat.study.selection import error_units, select, suggestion
 
 if TYPE_CHECKING:
     import openturns
@@ -77,7 +77,7 @@ class Function:
         self._whole, self.study = study, study.at(point)
         self.loads, self.workers = list(loads), workers
         self.names, self.cube_names = _names(study), sampling.streams(study)
-        self.units = UNITS | ({VARIANT: "1"} if VARIANT in self.names else {})
+        self.units = error_units(study.mechanism) | ({VARIANT: "1"} if VARIANT in self.names else {})
         self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
         self.copula = study.copula
         zones = [name for name in study.tolerances if axes.is_zone(name)]
@@ -111,7 +111,7 @@ class Function:
         columns = columns_of(x, self.names, [name for name in self.units if name not in self.names], "names")
         n = len(next(iter(columns.values())))
         variant = self._variants(columns.pop(VARIANT, np.zeros(n)))
-        errors = nominal_errors(n)
+        errors = nominal_errors(n, self.study.mechanism)
         for name, value in (self.study.errors | columns).items():
             errors[name] = value
         return self._simulate(errors, variant)
@@ -148,7 +148,7 @@ class Function:
         """Loads of the joint without errors, (m,), SI."""
         status = self.status
         try:
-            return np.asarray(self._simulate(nominal_errors(1), np.zeros(1, np.intp))[0])
+            return np.asarray(self._simulate(nominal_errors(1, self.study.mechanism), np.zeros(1, np.intp))[0])
         finally:
             self.status = status
 
@@ -158,7 +158,7 @@ class Function:
         choice = choose_fidelity(self._whole) if self._whole.solver.fidelity == "auto" else {}
         options = [settings(solver, choice) for solver in self._whole.solvers]
         for each in dict.fromkeys(options):
-            compile_missing(each)
+            compile_missing(self.study.mechanism, each)
         return options
 
     def openturns(self, cube: bool = False) -> tuple[openturns.Function, openturns.Distribution]:
@@ -247,19 +247,23 @@ class Function:
         for number in range(len(distinct)):
             here = np.flatnonzero(option == number)
             parts += [(here[first : first + size], distinct[number]) for first in range(0, here.size, size)]
-        blocks = (Block("", slots, parameters_of(study, variant[slots], errors[slots]), own) for slots, own in parts)
+        blocks = (
+            Block("", slots, parameters_of(study, variant[slots], errors[slots]), own, study.mechanism)
+            for slots, own in parts
+        )
         finished: Generator[tuple[Block, Timed | pool.Lost], None, None]
         if is_alone:
             finished = ((block, simulate_block(simulate_rows, "none", 0, {}, block)) for block in blocks)
         else:
             some = spread(n, SOME)
             for own in distinct:  # once, before the processes start
-                compile_missing(own, parameters_of(study, variant[some], errors[some]))
-            finished = pool.map_blocks(work_beside(*distinct), blocks, workers)
+                compile_missing(study.mechanism, own, parameters_of(study, variant[some], errors[some]))
+            finished = pool.map_blocks(work_beside(study.mechanism, *distinct), blocks, workers)
         with closing(finished):
             for block, result in finished:
                 table = results_of(block, result)
-                self.status[block.slots], loads[block.slots] = table["status"], loads_of(table, self.loads)
+                self.status[block.slots] = table["status"]
+                loads[block.slots] = loads_of(table, self.loads, study.mechanism)
         return loads
 
 
@@ -290,18 +294,20 @@ def function(
     """
     faults = []
     chosen: dict[str, None] = {}
-    for pattern in (study.asked or SHOWN_LOADS) if loads is None else loads:
-        names = select(pattern, UNIT_OF_LOAD)
+    every = list(units_of_loads(study.mechanism))
+    for pattern in (study.asked or shown_loads(study.mechanism)) if loads is None else loads:
+        names = select(pattern, every)
         chosen.update(dict.fromkeys(names))
         if not names:
-            faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, list(UNIT_OF_LOAD))))
+            faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, every)))
     raise_all(faults)
     return Function(study, list(chosen), point, workers)
 
 
 def _names(study: Study) -> list[str]:
     """Columns in which joints of a study differ: errors that are drawn, swept or listed, and the number of a joint."""
-    swept = [name for axis in study.sweep for name in axis.names if name in UNITS]
+    of_errors = error_units(study.mechanism)
+    swept = [name for axis in study.sweep for name in axis.names if name in of_errors]
     values = (*study.listed.cases.values(), *study.listed.points) if study.listed else ()
     errors = dict.fromkeys([*sampling.columns(study), *swept, *(name for errors in values for name in errors)])
     return [*errors, *([VARIANT] if len(study.joints) > 1 else [])]

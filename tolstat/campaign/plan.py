@@ -220,7 +220,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     """
     workers = workers or available_cores()
     stage(stage_name())
-    warm_up()
+    warm_up(mechanism=study.mechanism)
     stage("pilot")
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     if pilot == PILOT < study.rows:
@@ -238,8 +238,8 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
     status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
-    specs = history_specs(solver, study.output.histories, study.output.harmonics)
-    document = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
+    specs = history_specs(solver, study.output.histories, study.output.harmonics, study.mechanism)
+    document = metadata.of_study(study, range(study.rows), specs, dimensions(study.mechanism), solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -316,7 +316,8 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     if not settled.size:
         return 0.0
     begin = time.process_time()
-    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS, simulate_rows)
+    own = [options[i] for i in settled.tolist()]
+    verify.run_checks(params[settled], own, study.mechanism, verify.QUICK_CHECKS, simulate_rows)
     return time.process_time() - begin
 
 
@@ -333,10 +334,12 @@ def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals
 def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[NDArray[np.void], float]:
     """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
     for distinct in dict.fromkeys(options):
-        simulate_rows(params[[options.index(distinct)]], distinct)  # compiles, or loads, what these options need
+        simulate_rows(
+            params[[options.index(distinct)]], distinct, mechanism=study.mechanism
+        )  # compiles, or loads, what these options need
     kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
     begin = time.process_time()
-    return verify.simulate_each(params, options, kept), time.process_time() - begin
+    return verify.simulate_each(params, options, study.mechanism, kept), time.process_time() - begin
 
 
 def _width(share: float, n: int) -> float:
@@ -348,7 +351,7 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     plans = []
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
-        values, status, _ = worst.load_of([results[point] for point in points], load_of(name))
+        values, status, _ = worst.load_of([results[point] for point in points], load_of(name, study.mechanism))
         share = Sample.of(values.values, status).above(level, CONFIDENCE)
         valid = share.n - share.n_failed - share.n_unsettled
         nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, load_histories
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.late import pandas as pd
-from tolstat.common.load_kinds import CONTACTS, PINS, measure_of
+from tolstat.common.load_kinds import CONTACTS, kinds, measure_of
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.joint import ideal, nominal_errors, perturb
 from tolstat.solver.compilation import warm_up
@@ -24,6 +25,9 @@ from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
 from tolstat.study import Study
+
+KEPT = {"histories": "histories", "n_harmonics": "harmonics"}
+"""Key of ``[output]`` that each parameter of the simulation has its value from."""
 
 
 class CaseResult(NamedTuple):
@@ -39,6 +43,8 @@ class CaseResult(NamedTuple):
         Time that both simulations took together, without compilation, s.
     options : Options
         Solver options of the simulation.
+    mechanism : Mechanism
+        What was simulated.
     nominal : ndarray, (1,), dtype RESULT, optional
         Results of the joint without errors.
     """
@@ -47,6 +53,7 @@ class CaseResult(NamedTuple):
     params: NDArray[np.void]
     wall_s: float
     options: Options
+    mechanism: Mechanism
     nominal: NDArray[np.void] | None = None
 
     def summary(self) -> dict[str, Any]:
@@ -72,7 +79,8 @@ class CaseResult(NamedTuple):
         }
         if self.nominal is not None:
             facts["status_without_errors"] = Status(self.nominal[0]["status"]).label
-        return facts | {"max": {load.name: self._largest(load) for load in loads.LOADS.values()}}
+        every = loads.loads_of(self.mechanism).values()
+        return facts | {"max": {load.name: self._largest(load) for load in every}}
 
     def _largest(self, load: loads.Load) -> dict[str, Any]:
         value = float(load.of(self.simulation.results)[0])
@@ -106,12 +114,13 @@ class CaseResult(NamedTuple):
             "tau": tau,
             "Psi": (tau - ideal.speed_ratio(turned, self.params["alpha"][0, 0])) / tau,
         }
-        columns |= _components(BUSHING_LOADS, histories)
-        for p, pin in enumerate(PINS):
+        of_loads, pins = load_histories(self.mechanism), kinds(self.mechanism)["contact"].places
+        columns |= _components(of_loads[BUSHING_LOADS], histories)
+        for p, pin in enumerate(pins):
             for i, of in enumerate(CONTACTS):
                 columns[f"{pin}.contact_{of}"] = histories["contact"][:, p, i]
-        columns |= _components(SHAFT_LOADS, histories)
-        for p, pin in enumerate(PINS):
+        columns |= _components(of_loads[SHAFT_LOADS], histories)
+        for p, pin in enumerate(pins):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)
 
@@ -138,20 +147,21 @@ def simulate_case(case: Study) -> CaseResult:
     -------
     CaseResult
     """
-    errors = nominal_errors(2)
+    errors = nominal_errors(2, case.mechanism)
     for name, value in case.errors.items():
         errors[name][0] = value
     params, options = perturb(case.joint, case.operation, errors), case.solver.options()
-    both, wall_s = _timed(params, options)
+    both, wall_s = _timed(params, options, case.mechanism)
     with_errors = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
-    return CaseResult(with_errors, params[:1], wall_s, options, both.results[1:])
+    return CaseResult(with_errors, params[:1], wall_s, options, case.mechanism, both.results[1:])
 
 
-def _timed(params: NDArray[np.void], options: Options) -> tuple[Simulation, float]:
+def _timed(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> tuple[Simulation, float]:
     """Joints with full histories, and the time of their simulation without compilation, s."""
-    warm_up()
+    warm_up(mechanism=mechanism)
     begin = time.perf_counter()
-    return simulate_rows(params, options, "full"), time.perf_counter() - begin
+    simulation = simulate_rows(params, options, mechanism=mechanism, histories="full")
+    return simulation, time.perf_counter() - begin
 
 
 def _number(value: float) -> float | None:
@@ -234,8 +244,8 @@ def replay(store: Reader, row: int) -> Replay:
         raise input_error(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")
     params = parameters(store, np.array([here.start]))
     options = options_of(store, here.start)
-    simulation, wall_s = _timed(params, options)
-    result = CaseResult(simulation, params, wall_s, options)
+    simulation, wall_s = _timed(params, options, store.mechanism)
+    result = CaseResult(simulation, params, wall_s, options, store.mechanism)
     differences = []
     for c in store.columns:
         before, now = (np.ascontiguousarray(c.of(table)) for table in (stored, simulation.results))
@@ -248,8 +258,8 @@ def replay(store: Reader, row: int) -> Replay:
 
 
 def _different_histories(store: Reader, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:
-    kind: Any = store.identity["output.histories"]
-    now = simulate_rows(params, options, kind, store.identity["output.harmonics"]).histories
+    kept = {name: store.identity[f"output.{key}"] for name, key in KEPT.items()}
+    now = simulate_rows(params, options, mechanism=store.mechanism, **kept).histories
     differences = []
     for name in store.history_specs:
         before = store.histories(name, np.array([row]))

@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -249,10 +250,10 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
         if choice:
             tell(fidelity.describe(choice))
         options = settings(study.solver, choice)
-        histories = history_specs(options, *_history_options(study))
+        histories = history_specs(options, *_history_options(study), study.mechanism)
         errors = draw_blocks(study, rows)
         origin = origin_blocks(study, rows)
-        return Writer.create(path, study, errors, histories, dimensions(), rows, options, choice, origin)
+        return Writer.create(path, study, errors, histories, dimensions(study.mechanism), rows, options, choice, origin)
     store = Writer.open(path)
     try:
         _check_same(store, study, rows)
@@ -281,7 +282,9 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force
-        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form)
+        simulate = partial(simulate_beside, mechanism=study.mechanism)
+        settings_of_choice = params, options, budget, study.asked, simulate, min_steps, closed_form
+        return fidelity.choose(*settings_of_choice, mechanism=study.mechanism)
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:

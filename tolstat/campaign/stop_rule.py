@@ -21,7 +21,8 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.files import finite
-from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LIMIT, Limit, load_of
+from tolstat.common.loads import ANY_LIMIT, AT, Limit, load_of, units_of_limits
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
 from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
@@ -103,7 +104,7 @@ class Outcome(NamedTuple):
         return {"rule": rule.text, "reached": self.reached} | self.look._asdict() | how
 
 
-def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) -> Limit:
+def limit_of(text: str, limits: Mapping[str, float], mechanism: Mechanism, option: str, example: str) -> Limit:
     """Read a limit.
 
     Parameters
@@ -113,6 +114,8 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
         limit of the study.
     limits : mapping
         Limits of the study, SI.
+    mechanism : Mechanism
+        Whose loads they are.
     option : str
         Option of the command line, shown in faults.
     example : str
@@ -126,7 +129,7 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     if text.split() == ANY_LIMIT.split():
         if not limits:
             raise input_error(option, "the study has no limits", f"add [limits] to it, or {example}")
-        return Limit(ANY_LIMIT, tuple(limits), tuple(limits.values()))
+        return Limit(ANY_LIMIT, tuple(limits), tuple(limits.values()), mechanism)
     if text.split() == ["all", "limits"]:
         remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
         raise input_error(option, f"{text.strip()!r} is not a limit", remedy)
@@ -137,15 +140,21 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     if match is None:
         raise input_error(option, f"{text.strip()!r} is not a limit", example)
     entry = Entry(match["load"], (match["load"],), match["level"])
-    if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LIMIT:
-        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(UNIT_OF_LIMIT)))
-    loads = resolve(entry, UNIT_OF_LIMIT, option)
-    level = quantity(entry, UNIT_OF_LIMIT[loads[0]], option)
-    return Limit(entry.pattern, tuple(loads), (level,) * len(loads))
+    unit_of = units_of_limits(mechanism)
+    if not set(entry.pattern) & set("*?[") and entry.pattern not in unit_of:
+        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(unit_of)))
+    loads = resolve(entry, unit_of, option)
+    level = quantity(entry, unit_of[loads[0]], option)
+    return Limit(entry.pattern, tuple(loads), (level,) * len(loads), mechanism)
 
 
 def parse(
-    text: str, limits: Mapping[str, float], what: str = "width", option: str = "--until", example: str = EXAMPLE
+    text: str,
+    limits: Mapping[str, float],
+    mechanism: Mechanism,
+    what: str = "width",
+    option: str = "--until",
+    example: str = EXAMPLE,
 ) -> Statement:
     """Read a stop rule, or another statement.
 
@@ -155,6 +164,8 @@ def parse(
         ``"P(LIMIT) width < 0.002"``, with a LIMIT as in `limit_of`.
     limits : mapping
         Limits of the study, SI.
+    mechanism : Mechanism
+        Whose loads they are.
     what : str
         Word before the ``<``; empty for the probability itself.
     option, example
@@ -176,7 +187,7 @@ def parse(
     bound = finite(match["bound"])
     with collected() as faults:
         with gather(faults):
-            limit = limit_of(match["limit"], limits, option, example)
+            limit = limit_of(match["limit"], limits, mechanism, option, example)
         if not 0.0 < bound < 1.0:
             faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
     return Statement(text.strip(), limit, bound)
@@ -211,8 +222,8 @@ def run_until(study: Study, out: Path, rule: Statement, run: Callable[[int], obj
     if study.sampling.joints_per_lot > 1:
         found = "joints share lots: the interval of a stop needs independent samples"
         raise input_error("--until", found, "remove sampling.joints_per_lot, or --until")
-    for load in map(load_of, rule.limit.loads):
-        if not holds(study.output.columns, load.name):
+    for load in (load_of(name, study.mechanism) for name in rule.limit.loads):
+        if not holds(study.columns, load):
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
     taken: list[int] = []  # looks at the joints of the file so far

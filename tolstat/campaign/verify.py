@@ -20,12 +20,22 @@ from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.what_if import check_code
-from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.loads import Limit, load_of, split
-from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import (
+    Fidelity,
+    Method,
+    Options,
+    Simulation,
+    Start,
+    Status,
+    tables,
+    to_names,
+    without_results,
+)
 from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.solver.reference import reference_rows
@@ -87,6 +97,7 @@ def options_of_check(options: Options, check: str) -> Options:
 def run_checks(
     params: NDArray[np.void],
     options: Sequence[Options],
+    mechanism: Mechanism,
     names: Iterable[str] = ALL_CHECKS,
     simulate: Simulate = simulate_beside,
     workers: int = 1,
@@ -100,6 +111,8 @@ def run_checks(
         Parameters of the joints.
     options : sequence of Options
         Solver options of each joint in the campaign.
+    mechanism : Mechanism
+        What they are.
     names : iterable of str
         Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
     simulate : callable
@@ -119,20 +132,20 @@ def run_checks(
         for name in (*names, *(("fidelity",) if lower else ())):
             changed = [options_of_check(of_joint, name) for of_joint in options]
             if name == "reference":
-                results = _references(params, changed, workers, progress)
+                results = _references(params, changed, mechanism, workers, progress)
             else:
-                results = simulate_each(params, changed, simulate)
-            checks[name] = Check(CHECKS[name][0], tables.to_names(changed[0]), results)
+                results = simulate_each(params, changed, mechanism, simulate)
+            checks[name] = Check(CHECKS[name][0], to_names(changed[0]), results)
     return checks
 
 
 def _references(
-    params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
+    params: NDArray[np.void], options: Sequence[Options], mechanism: Mechanism, workers: int, progress: Progress
 ) -> NDArray[np.void]:
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
-    done = pool.map_blocks(Work(_reference), joints, min(workers, len(joints)))
-    results, counts = tables.without_results(len(joints), Status.CRASHED), Counts(len(joints))
+    done = pool.map_blocks(Work(partial(_reference, mechanism)), joints, min(workers, len(joints)))
+    results, counts = without_results(len(joints), Status.CRASHED, mechanism), Counts(len(joints))
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:
@@ -143,23 +156,23 @@ def _references(
     return results
 
 
-def _reference(joint: tuple[int, NDArray[np.void], Options]) -> NDArray[np.void]:
+def _reference(mechanism: Mechanism, joint: tuple[int, NDArray[np.void], Options]) -> NDArray[np.void]:
     """Reference of a joint, given by its index, its row of PARAM, shape (1,), and its solver options."""
-    return reference_rows(*joint[1:])
+    return reference_rows(*joint[1:], mechanism=mechanism)
 
 
 def simulate_each(
-    params: NDArray[np.void], options: Sequence[Options], simulate: Simulate = simulate_beside
+    params: NDArray[np.void], options: Sequence[Options], mechanism: Mechanism, simulate: Simulate = simulate_beside
 ) -> NDArray[np.void]:
     """Results of joints, (m,) table RESULT, each with its own options, without histories."""
-    results = np.empty(len(params), tables.RESULT)
+    results = np.empty(len(params), tables(mechanism).RESULT)
     for distinct in dict.fromkeys(options):
         here = np.array([each == distinct for each in options])
-        results[here] = simulate(params[here], distinct).results
+        results[here] = simulate(params[here], distinct, mechanism=mechanism).results
     return results
 
 
-Make = Callable[[NDArray[np.void], Sequence[Options]], dict[str, Check]]
+Make = Callable[[NDArray[np.void], Sequence[Options], Mechanism], dict[str, Check]]
 """Function that simulates joints again, see `run_checks`."""
 
 
@@ -185,9 +198,10 @@ def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> 
 
 def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
-    checks = make(parameters(store, slots), [options_of(store, slot) for slot in slots.tolist()])
+    options = [options_of(store, slot) for slot in slots.tolist()]
+    checks = make(parameters(store, slots), options, store.mechanism)
     for check in checks.values():
-        blank_others(check.results, store.columns)
+        blank_others(check.results, store.columns, store.mechanism)
     return Verification(seed, store.row(slots), pick(store.results, slots), checks)
 
 
@@ -314,8 +328,8 @@ def check_near(
         found = f"{joints} joints do not tell the numerical error near a limit"
         raise input_error("--joints", found, f"give {LEAST_NEAR} or more")
     with Writer.open(path) as store:
-        limit = limit_of(text, store.limits, "--near", EXAMPLE)
-        lacking = [name for name in limit.loads if not holds(store.columns, load_of(name).name)]
+        limit = limit_of(text, store.limits, store.mechanism, "--near", EXAMPLE)
+        lacking = [name for name in limit.loads if not holds(store.columns, load_of(name, store.mechanism))]
         if lacking:
             found = f"the file does not keep {', '.join(lacking)}"
             raise input_error("--near", found, "give loads that it keeps, see tolstat status")
@@ -369,10 +383,10 @@ def check_study(
     each = []
     for point in study.points:
         params = perturbed(study.at(point.name), rows, errors)
-        base = simulate_each(params, options)
-        checks = make(params, options)
+        base = simulate_each(params, options, study.mechanism)
+        checks = make(params, options, study.mechanism)
         for results in (base, *(check.results for check in checks.values())):
-            blank_others(results, study.output.columns)
+            blank_others(results, study.columns, study.mechanism)
         each.append(Verification(seed, rows, base, checks))
     return verification.together(each)
 

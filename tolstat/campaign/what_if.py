@@ -16,6 +16,7 @@ from tolstat.campaign import pool
 from tolstat.campaign.block import Block, Timed, loads_of, results_of
 from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Status, worst_status
 from tolstat.joint import perturb
 from tolstat.store import Reader, Writer, what_if
@@ -147,7 +148,7 @@ def options_of(study: Study, store: Writer) -> Options:
 def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
     """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
     pilot = list(_blocks(options, [as_drawn(study, range(joints))], points))
-    with closing(pool.map_blocks(work_beside(Options()), pilot, 1)) as done:
+    with closing(pool.map_blocks(work_beside(study.mechanism, Options()), pilot, 1)) as done:
         spent = sum(result.seconds for _, result in done if isinstance(result, Timed))
     return (spent or SLOW_S * joints) / joints
 
@@ -188,9 +189,9 @@ def simulate(
     in_file = what_if.read(store)
     names = asked.names(study)
     todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(in_file, change, names))]
-    table = _Table(todo, asked, names)
+    table = _Table(todo, asked, names, study.mechanism)
     blocks = _blocks(options_of(study, store), todo, asked.points)
-    done = pool.map_blocks(work_beside(Options()), blocks, workers, stop)
+    done = pool.map_blocks(work_beside(study.mechanism, Options()), blocks, workers, stop)
     counts, saved = Counts(table.status.size), time.monotonic()
     progress(counts)
     try:
@@ -218,15 +219,16 @@ def check_code(store: Reader) -> None:
 class _Table:
     """Loads, (n, points, k), and status, (n, points), of all joints to do, one set after the other."""
 
-    def __init__(self, todo: Sequence[Change], asked: Asked, names: tuple[str, ...]) -> None:
-        self.todo, self.asked, self.names = todo, asked, names
+    def __init__(self, todo: Sequence[Change], asked: Asked, names: tuple[str, ...], mechanism: Mechanism) -> None:
+        self.todo, self.asked, self.names, self.mechanism = todo, asked, names, mechanism
         n = sum(len(change.numbers) for change in todo)
         self.loads = np.full((n, len(asked.points), len(asked.loads)), np.nan)
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
         index = block.slots, self.asked.points.index(block.point)
-        self.loads[index], self.status[index] = loads_of(results, self.asked.loads), results["status"]
+        self.loads[index] = loads_of(results, self.asked.loads, self.mechanism)
+        self.status[index] = results["status"]
         return np.asarray(self.status[index])
 
     def sets(self, in_file: Mapping[str, Altered]) -> dict[str, Altered]:
@@ -256,7 +258,8 @@ def _blocks(options: Options, todo: Sequence[Change], points: Sequence[str]) -> 
             part = numbers[first : first + BLOCK]
             slots, errors = np.arange(begin + first, begin + first + len(part)), draw(part)
             for point, operation in operations.items():
-                yield Block(point, slots, perturb(changed.joint, operation, errors), options)
+                params = perturb(changed.joint, operation, errors)
+                yield Block(point, slots, params, options, changed.mechanism)
         begin += len(numbers)
 
 

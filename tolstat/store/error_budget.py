@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from tolstat.analysis import prediction
-from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
+from tolstat.analysis.accuracy import LEAST_NEAR, corrected, corrections, observables, size
 from tolstat.analysis.estimates import frozen
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.load_kinds import Kind
-from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
+from tolstat.common.loads import ANY_LIMIT, FloatArray, load_of
 from tolstat.store.view import View
 
 
@@ -37,7 +37,7 @@ def _shifted(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     if np.isnan(error):
         return None
     narrowed, name = view.narrowed(load.name)
-    by = error * _largest(narrowed, LOADS[name].kind) / load.scale
+    by = error * _largest(narrowed, load_of(name, view.mechanism).kind) / load.scale
     return load.shifted(-by), load.shifted(by)
 
 
@@ -67,11 +67,12 @@ def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     checks = {name: check.results for name, check in view.near.checks.items()}
     distance = np.abs(load.values - load.limit)
     nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
-    missing = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
+    number = observables(view.mechanism).index(name)
+    missing = corrections(view.near.base, checks, view.mechanism)[np.isin(view.near.rows, nearest), number]
     missing = missing[np.isfinite(missing)]
     if missing.size < LEAST_NEAR:
         return None
-    sizes = np.nan_to_num(_largest(view, LOADS[name].kind) / load.scale)
+    sizes = np.nan_to_num(_largest(view, load_of(name, view.mechanism).kind) / load.scale)
     low, high = corrected(np.zeros(load.values.size), sizes, missing)
     return load.shifted(low), load.shifted(high)
 
@@ -114,7 +115,7 @@ def relative(view: View, name: str) -> float:
     if name == ANY_LIMIT:
         return float(np.max([relative(view, limit) for limit in view.limits]))
     narrowed, plain = view.narrowed(name)
-    return narrowed.numerical_error.get(LOADS[plain].kind.key, np.nan)
+    return narrowed.numerical_error.get(load_of(plain, view.mechanism).kind.key, np.nan)
 
 
 def delivery(samples: Sequence[Sample], level: float, number: int, confidence: float) -> dict[str, float]:

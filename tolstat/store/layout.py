@@ -15,9 +15,11 @@ import numpy as np
 from h5py import h5d, h5p
 from numpy.typing import NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, MEASURING, SHAFT_LOADS, LoadHistory
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, kept_columns
-from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
+from tolstat.common.cardan import MECHANISMS
+from tolstat.common.channels import LoadHistory, components, followed, load_histories
+from tolstat.common.columns import DESIGN_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, error_columns, kept_columns
+from tolstat.common.load_kinds import CONTACTS, kinds
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
 from tolstat.store import metadata as documents
 from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_scale, store_error
@@ -88,12 +90,13 @@ def is_at_point(path: str) -> bool:
 
 def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
     """Columns of each group that a file has, by group."""
-    groups = {"errors": ERROR_COLUMNS}
+    mechanism = MECHANISMS[metadata.mechanism]
+    groups = {"errors": error_columns(mechanism)}
     if metadata.design.variants:
         groups["design"] = DESIGN_COLUMNS
     if drawn := drawn_columns(metadata.sampling):
         groups["origin"] = drawn
-    return groups | {"results": kept_columns(metadata.identity), "ledger": LEDGER_COLUMNS}
+    return groups | {"results": kept_columns(metadata.identity, mechanism), "ledger": LEDGER_COLUMNS}
 
 
 def datasets(metadata: Metadata) -> list[Stored]:
@@ -142,7 +145,8 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
         ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `columns.drawn_columns`.
     """
     n, first, codes, groups = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
-    put_attributes(file, {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "description": ABOUT})
+    about = {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "mechanism": metadata.mechanism}
+    put_attributes(file, about | {"description": ABOUT})
     documents.write(file, metadata)
     row = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
     for begin in range(0, n, BLOCK):
@@ -163,7 +167,8 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
         if metadata.histories:  # at full size: a full disk is told before the first joint
             histories = _linked(holder, "histories")
             for name, spec in metadata.histories.items():
-                attach_scales(_create(histories, name, (n, *spec.shape), spec, row, MEANINGS), spec)
+                dataset = _create(histories, name, (n, *spec.shape), spec, row, MEANINGS)
+                attach_scales(dataset, spec, MECHANISMS[metadata.mechanism])
     session = file.create_group("session")
     for name, (dtype, unit, description) in SESSION.items():
         blank = np.nan if dtype == "f8" else int(name == "number")
@@ -251,39 +256,43 @@ def _allocated(dtype: str | None, blank: bool = False) -> h5p.PropDCID:
     return properties
 
 
-def _names(history: LoadHistory) -> tuple[str, ...]:
-    return tuple(signal.name for signal in COMPONENTS.values() if signal.history == history)
+def axes_of(mechanism: Mechanism) -> dict[str, tuple[tuple[str, ...], str]]:
+    """Names along an axis of a history, and what they name, by axis."""
+    bushings, shafts = load_histories(mechanism).values()
+    measuring = tuple(kind.key for kind in followed(mechanism) if not kind.measure)
+    return {
+        "bushing": (bushings.places, "bushing"),
+        "component": (bushings.components, "force F (N) and torque T (N m) along e, t and z"),
+        "pin": (kinds(mechanism)["contact"].places, "pin"),
+        "contact_force": (CONTACTS, "contact force of the outermost station, of the innermost one, resultant of all"),
+        "shaft": (shafts.places, "shaft"),
+        "shaft_component": (shafts.components, "force f (N) and moment m (N m) about O, in axes that do not turn"),
+        "load": (measuring, "force and torque"),
+        "channel": (_names(bushings, mechanism), "load whose cycles are counted: a component"),
+        "shaft_channel": (_names(shafts, mechanism), "load of a shaft whose cycles are counted: a component"),
+        "of_cycle": (("range", "mean"), "range and mean of a cycle"),
+    }
 
 
-AXES: dict[str, tuple[tuple[str, ...], str]] = {
-    "bushing": (BUSHINGS, "bushing"),
-    "component": (BUSHING_LOADS.components, "force F (N) and torque T (N m) along e, t and z"),
-    "pin": (PINS, "pin"),
-    "contact_force": (CONTACTS, "contact force of the outermost station, of the innermost one, resultant of all"),
-    "shaft": (SHAFTS, "shaft"),
-    "shaft_component": (SHAFT_LOADS.components, "force f (N) and moment m (N m) about O, in axes that do not turn"),
-    "load": (tuple(kind.key for kind in MEASURING), "force and torque"),
-    "channel": (_names(BUSHING_LOADS), "load whose cycles are counted: a component"),
-    "shaft_channel": (_names(SHAFT_LOADS), "load of a shaft whose cycles are counted: a component"),
-    "of_cycle": (("range", "mean"), "range and mean of a cycle"),
-}
-"""Names along an axis of a history, and what they name, by axis."""
+def _names(history: LoadHistory, mechanism: Mechanism) -> tuple[str, ...]:
+    return tuple(signal.name for signal in components(mechanism).values() if signal.history == history)
 
 
-def attach_scales(dataset: h5py.Dataset, spec: HistorySpec) -> None:
+def attach_scales(dataset: h5py.Dataset, spec: HistorySpec, mechanism: Mechanism) -> None:
     """Attach dimension scales to a history: those named in `spec` to all axes but the first."""
     name = dataset.name.rpartition("/")[2]
     axes = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
     for k, (axis, size) in enumerate(zip(axes, spec.shape, strict=True), 1):
         if axis not in dataset.parent:
-            put_scale(dataset.parent, axis, *scale_of(axis, size))
+            put_scale(dataset.parent, axis, *scale_of(axis, size, mechanism))
         dataset.dims[k].attach_scale(dataset.parent[axis])
 
 
-def scale_of(axis: str, size: int) -> tuple[NDArray[Any], str, str]:
+def scale_of(axis: str, size: int, mechanism: Mechanism) -> tuple[NDArray[Any], str, str]:
     """Values along an axis of a history, their unit and their description."""
-    if axis in AXES and len(AXES[axis][0]) == size:
-        return np.array(AXES[axis][0], dtype=object), "1", AXES[axis][1]
+    names, meaning = axes_of(mechanism).get(axis, ((), ""))
+    if len(names) == size:
+        return np.array(names, dtype=object), "1", meaning
     if axis == "theta":
         return 2.0 * np.pi * np.arange(size) / size, "rad", "input angle"
     if axis == "harmonic":

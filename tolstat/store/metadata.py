@@ -42,6 +42,8 @@ class Metadata(BaseModel):
     ----------
     study_name, study : str
         Name of the study, and the TOML that it was read from.
+    mechanism : str
+        Name of the mechanism, see `cardan.MECHANISMS`.
     limits : dict of str to float
         Limit of each load, SI.
     points : dict of str to dict
@@ -70,6 +72,7 @@ class Metadata(BaseModel):
 
     study_name: str
     study: str
+    mechanism: str
     limits: dict[str, float]
     points: dict[str, dict[str, Any]]
     joint: dict[str, Any]
@@ -114,6 +117,7 @@ def of_study(
     """
     return Metadata(
         **editable(study),
+        mechanism=study.mechanism.name,
         identity=study.identity(),
         options=to_names(options or study.solver.options()),
         fidelity=dict(fidelity or {}),

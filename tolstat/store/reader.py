@@ -17,19 +17,19 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import tables
+from tolstat.common.cardan import MECHANISMS
 from tolstat.common.columns import (
     DESIGN_COLUMNS,
-    ERROR_COLUMNS,
-    OPTIONAL_FIELDS,
     SUBSET,
     Column,
     drawn_columns,
+    error_columns,
     kept_columns,
+    optional_columns,
 )
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import Status
+from tolstat.common.tables import DESIGN, Status, tables
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import GROUP, ROWS, CheckedFile, Integrity
@@ -52,6 +52,8 @@ class Reader:
         The file.
     metadata : Metadata
         All that it says of itself beyond the tables; the following attributes are from it.
+    mechanism : Mechanism
+        What was simulated.
     n : int
         Number of joints in the file.
     rows : range
@@ -103,6 +105,7 @@ class Reader:
 
     def _describe(self, document: metadata.Metadata) -> None:
         self.metadata = document
+        self.mechanism = MECHANISMS[document.mechanism]
         self.study_name, self.study_text = document.study_name, document.study
         self.joint, self.limits = document.joint, document.limits
         self.identity, self.options, self.fidelity = document.identity, document.options, document.fidelity
@@ -112,7 +115,7 @@ class Reader:
         self.case_names, self.variants = document.design.cases, document.design.variants
         self.n, self.campaign_rows = document.n, document.campaign_rows
         self.rows = range(document.first_row, document.first_row + document.n)
-        self.columns = kept_columns(document.identity)
+        self.columns = kept_columns(document.identity, self.mechanism)
         self.points = {name: Point.of(name, values) for name, values in document.points.items()}
 
     def at(self, point: str) -> Self:
@@ -253,13 +256,14 @@ class Reader:
 
         Raises a `StoreError` when a code is unknown to this version.
         """
-        names = (tables.RESULT.names or ()) if fields is None else fields
+        dtype = tables(self.mechanism).RESULT
+        names = (dtype.names or ()) if fields is None else fields
         status = self.status(slots)  # first: the values that it declares valid were written before it
         others = tuple(c for c in self.columns if c.field != "status")
-        table = self._table("results", others, tables.RESULT, slots, names)
+        table = self._table("results", others, dtype, slots, names)
         pending = status == Status.PENDING
         for name in names:
-            table[name][pending] = np.nan if tables.RESULT[name].base.kind == "f" else 0
+            table[name][pending] = np.nan if dtype[name].base.kind == "f" else 0
         if "status" in names:
             table["status"] = status
         return table
@@ -282,7 +286,8 @@ class Reader:
 
         Raises a `StoreError` when the errors are damaged.
         """
-        return self._table("errors", ERROR_COLUMNS, tables.ERROR, slots, fields or tables.ERROR.names or ())
+        dtype = tables(self.mechanism).ERROR
+        return self._table("errors", error_columns(self.mechanism), dtype, slots, fields or dtype.names or ())
 
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of every joint, (n,) table DESIGN.
@@ -292,7 +297,7 @@ class Reader:
         if not self.variants:
             remedy = 'give the result file of a study with sampling.method = "cases", or of a sweep of dimensions'
             raise store_error(self.path, "has no list of variants", remedy)
-        return self._table("design", DESIGN_COLUMNS, tables.DESIGN, slice(None), tables.DESIGN.names or ())
+        return self._table("design", DESIGN_COLUMNS, DESIGN, slice(None), DESIGN.names or ())
 
     def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
         """How every joint was drawn, (n,) table with the columns `columns.drawn_columns`, or of a slice of file slots.
@@ -374,7 +379,7 @@ class Reader:
         whole = tuple(fields) == dtype.names
         table = np.zeros(max(0, last - first), dtype if whole else [(name, dtype[name]) for name in fields])
         if group == "results":
-            for name in set(fields) & set(OPTIONAL_FIELDS):
+            for name in set(fields) & {c.field for c in optional_columns(self.mechanism)}:
                 table[name] = np.nan
         for c in columns:
             if c.field in fields:

@@ -13,7 +13,7 @@ from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.design import Design, Independent, Listed, Replicated
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
-from tolstat.common.tables import PARAM, Options, from_names
+from tolstat.common.tables import Options, from_names, tables
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
@@ -123,7 +123,7 @@ def note_on_mounting(store: Reader) -> str:
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
-    params = np.empty(len(rows), PARAM)
+    params = np.empty(len(rows), tables(store.mechanism).PARAM)
     for i, row in enumerate(rows.tolist()):
         errors = store.errors(slice(row, row + 1))
         params[i : i + 1] = perturb(joint_of(store, row), operation_of(store, row), errors)
@@ -137,7 +137,7 @@ def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) ->
 
 def parameters_of(study: Study, variant: NDArray[np.integer], errors: NDArray[np.void]) -> NDArray[np.void]:
     """Parameters of joints, (m,) table PARAM, from their errors and the index of the variant of each, (m,)."""
-    params = np.empty(len(errors), PARAM)
+    params = np.empty(len(errors), tables(study.mechanism).PARAM)
     for number in np.unique(variant):
         here = variant == number
         params[here] = perturb(study.joints[number], study.operations[number], errors[here])

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.columns import ERROR_COLUMNS, Column, drawn_columns
+from tolstat.common.columns import Column, drawn_columns, error_columns
 from tolstat.common.errors import input_error
 from tolstat.common.late import pandas as pd
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import loads_of
 from tolstat.common.tables import Status
 from tolstat.store import recorded
 from tolstat.store.layout import MEANINGS
@@ -73,10 +73,10 @@ class ResultFile(Reader):
     @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
-        names, results = list(self.loads), self.loads.view.nominal
-        values = [float(LOADS[name].of(results)[0]) if len(results) else np.nan for name in names]
+        names, results, every = list(self.loads), self.loads.view.nominal, loads_of(self.mechanism)
+        values = [float(every[name].of(results)[0]) if len(results) else np.nan for name in names]
         series = pd.Series(values, pd.Index(names, name="load"), dtype=float, name="nominal")
-        series.attrs["units"] = {name: LOADS[name].unit for name in names}
+        series.attrs["units"] = {name: every[name].unit for name in names}
         return series
 
     def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
@@ -174,7 +174,8 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `ResultFile.to_pandas` for the others."""
-    return {c.name: c for c in (*drawn_columns(store.sampling), *ERROR_COLUMNS, *OPERATING, *store.columns)}
+    of_errors = error_columns(store.mechanism)
+    return {c.name: c for c in (*drawn_columns(store.sampling), *of_errors, *OPERATING, *store.columns)}
 
 
 def in_blocks(store: Reader, nominal: bool, at_once: int = AT_ONCE) -> Iterator[pd.DataFrame]:
@@ -195,7 +196,7 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
     if drawn:
         origin = store.origin(rows)
         data |= {c.name: c.of(origin) for c in drawn}
-    data |= {c.name: c.of(errors) for c in ERROR_COLUMNS}
+    data |= {c.name: c.of(errors) for c in error_columns(store.mechanism)}
     data |= recorded.operating_points(store, rows)
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:

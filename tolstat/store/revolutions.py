@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
+from tolstat.common.channels import BUSHING_LOADS, LoadHistory, channels, followed, histories_of, load_histories
 from tolstat.common.cores import Forked, begun, in_order
 from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
@@ -26,11 +26,9 @@ ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
 JOINTS_PER_BLOCK = 256
 """Maximum number of joints whose loads are read at a time: 9 MB at 180 samples per revolution."""
-LARGEST = [f"{kind.key}_max" for kind in MEASURING]
-"""Fields of the results that joints simulated again are compared in."""
 
 Loads = dict[str, NDArray[Any]]
-"""Loads of m joints by name of `LOAD_HISTORIES`, (m, samples, places, components), N and N m."""
+"""Loads of m joints by name of `channels.load_histories`, (m, samples, places, components), N and N m."""
 Again = tuple[Loads, FloatArray]
 """Loads of joints, and the largest relative difference of each joint's from the stored values, (m,)."""
 
@@ -57,8 +55,12 @@ class Revolutions(NamedTuple):
     apart: float
 
 
-def held(store: Reader, histories: Sequence[LoadHistory] = (BUSHING_LOADS,)) -> str:
-    """Kind of histories that a file holds of loads, ``"stored"`` or ``"harmonics"``; empty if it lacks any of them."""
+def held(store: Reader, histories: Sequence[LoadHistory] = ()) -> str:
+    """Kind of histories that a file holds of loads, ``"stored"`` or ``"harmonics"``; empty if it lacks any of them.
+
+    Without `histories` those of the bushings.
+    """
+    histories = histories or (load_histories(store.mechanism)[BUSHING_LOADS],)
     if all(history.name in store.history_specs for history in histories):
         return "stored"
     if all(f"{history.prefix}coefficients_real" in store.history_specs for history in histories):
@@ -82,7 +84,7 @@ def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angle
     slots : ndarray of int, shape (m,)
         File slots, ascending; none pending. Of one variant: of a sweep one joint at a time.
     names : sequence of str
-        Channels to return, keys of `channels.CHANNELS`.
+        Channels to return, keys of `channels.channels`.
     max_angles : int
         Approximate number of samples per revolution to keep; the samples are thinned evenly.
 
@@ -95,7 +97,7 @@ def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angle
     InputError
         When a joint has to be simulated again and this version cannot read the file's joint or options.
     """
-    histories = histories_of(names)
+    histories = histories_of(names, store.mechanism)
     origin = held(store, histories) or AGAIN
     steps = int(store.options["steps_per_rev"])
     every = max(1, steps // max_angles)
@@ -106,7 +108,7 @@ def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angle
         apart = max(apart, difference)
         thinned = {name: values[:, ::every] for name, values in histories_of_part.items()}
         for name, values in loads.items():
-            values[part] = CHANNELS[name].of(thinned)
+            values[part] = channels(store.mechanism)[name].of(thinned)
     return Revolutions(angles, loads, origin, apart)
 
 
@@ -119,7 +121,7 @@ def of_components(
     """
     again = not held(store, histories)
     if again and len(slots) and store.ahead is None:
-        warm_up()
+        warm_up(mechanism=store.mechanism)
     for part in blocks(len(slots)):
         if again:
             ready = None if store.ahead is None else store.ahead.of(slots[part])
@@ -184,8 +186,7 @@ class Ahead(NamedTuple):
         if not np.array_equal(self.slots[np.minimum(position, len(self.slots) - 1)], slots):
             return None
         pieces = in_order(self.parts)
-        names = [history.name for history in LOAD_HISTORIES]
-        loads = {name: np.concatenate([piece[name] for piece, _ in pieces])[position] for name in names}
+        loads = {name: np.concatenate([piece[name] for piece, _ in pieces])[position] for name in pieces[0][0]}
         return loads, np.concatenate([apart for _, apart in pieces])[position]
 
 
@@ -201,8 +202,8 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
     processes : int
         Number of processes; with 1 the joints are simulated when they are asked for.
     """
-    if processes > 1 and not is_compiled():
-        warm_up()  # one process compiles
+    if processes > 1 and not is_compiled(mechanism=store.mechanism):
+        warm_up(mechanism=store.mechanism)  # one process compiles
     each = [partial(_simulated, store, slots[part]) for part in blocks(len(slots))]
     store.ahead = Ahead(slots, begun(each, max(1, processes - 1), here=int(processes == 1)))
 
@@ -212,18 +213,20 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     first, steps = int(slots[0]), int(store.options["steps_per_rev"])
     params = perturb(joint_of(store, first), operation_of(store, first), pick(store.errors, slots))
     compilation.announce()
-    attempts, stored = pick(store.attempt, slots), pick(store.results, slots)[LARGEST].copy()
-    loads = {h.name: np.empty((len(slots), steps, *h.shape), np.float32) for h in LOAD_HISTORIES}
+    histories = load_histories(store.mechanism).values()
+    largest = [f"{kind.key}_max" for kind in followed(store.mechanism) if not kind.measure]
+    attempts, stored = pick(store.attempt, slots), pick(store.results, slots)[largest].copy()
+    loads = {h.name: np.empty((len(slots), steps, *h.shape), np.float32) for h in histories}
     apart = np.zeros(len(slots))
     for attempt in np.unique(attempts):
         here = np.flatnonzero(attempts == attempt)
-        again = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
+        options = options_of(store, int(slots[here[0]]))
+        again = simulate_rows(params[here], options, mechanism=store.mechanism, histories="full")
         for name, values in loads.items():
             samples = again.histories[name]
             values[here] = samples[:, np.arange(steps) * samples.shape[1] // steps]
-        for name in LARGEST:
+        for name in largest:
             with np.errstate(invalid="ignore", divide="ignore"):
                 off = np.abs(again.results[name] / stored[name][here] - 1.0)
-            largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
-            apart[here] = np.maximum(apart[here], largest)
+            apart[here] = np.maximum(apart[here], off.max(axis=1, initial=0.0, where=np.isfinite(off)))
     return loads, apart

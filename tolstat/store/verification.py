@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import tables
 from tolstat.common.columns import blank_others
+from tolstat.common.tables import tables
 from tolstat.store import layout
 from tolstat.store.hdf5 import pick, put_attributes, put_scale, text, told_as_damage
 from tolstat.store.metadata import CHECKSUM
@@ -74,8 +74,8 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         rows = np.asarray(group["rows"][:], np.intp)
         checks = {}
         for check in text(group.attrs, "checks").split():
-            table = np.empty(len(rows), tables.RESULT)
-            blank_others(table, store.columns)
+            table = np.empty(len(rows), tables(store.mechanism).RESULT)
+            blank_others(table, store.columns, store.mechanism)
             for c in store.columns:
                 c.of(table)[:] = group[check][c.name][:]
             attrs = group[check].attrs

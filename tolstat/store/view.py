@@ -18,9 +18,10 @@ from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.columns import METHODS, holds
 from tolstat.common.counts import Counts
 from tolstat.common.errors import input_error
-from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
+from tolstat.common.loads import ANY_LIMIT, FloatArray, Limit, load_of, loads_of, shown_loads, split
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import Status
+from tolstat.common.tables import Status, tables
 from tolstat.store import verification, what_if, worst
 from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
@@ -99,6 +100,11 @@ class View:
         plain, where = split(name)
         return (self.at(where), plain) if where else (self, plain)
 
+    @property
+    def mechanism(self) -> Mechanism:
+        """What was simulated."""
+        return self.store.mechanism
+
     @cached_property
     def study(self) -> Study:
         """The study that the file was made from, with its distributions; see `recall` for exceptions."""
@@ -130,11 +136,11 @@ class View:
         if self.verification is None:
             return {}
         checks = {name: check.results for name, check in self.verification.checks.items()}
-        return accuracy.usual(self.verification.base, checks)
+        return accuracy.usual(self.verification.base, checks, self.mechanism)
 
     @cached_property
     def results(self) -> worst.Columns:
-        """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
+        """Columns `loads.load_fields` of the results, (n, ...) each."""
         if len(self.parts) > 1:
             return worst.together([part.results for part in self.parts])
         return worst.columns_of(self.store)
@@ -165,11 +171,13 @@ class View:
 
     @cached_property
     def mode_share(self) -> FloatArray:
-        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept.
+        """Mean share of the revolution by pin and contact mode, (pins, modes), over the valid joints; NaN if not kept.
 
         Several operating points have none.
         """
-        return np.full((4, 4), np.nan) if len(self.parts) > 1 else worst.mode_share(self.store)
+        if len(self.parts) > 1:
+            return np.full(tables(self.mechanism).RESULT["mode_share"].shape, np.nan)
+        return worst.mode_share(self.store)
 
     def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
@@ -189,12 +197,13 @@ class View:
                 at_points = view.load(plain)
                 self._loads[name] = replace(at_points, name=name, limit=self.limits.get(name, at_points.limit))
                 return self._loads[name]
-            if name not in LOADS:
-                raise input_error(name, "is not a load", did_you_mean(name, list(LOADS)))
-            if not holds(self.columns, name):
+            every = loads_of(self.mechanism)
+            if name not in every:
+                raise input_error(name, "is not a load", did_you_mean(name, list(every)))
+            if name not in self.kept_loads:
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise input_error(name, found, f"give one of: {', '.join(self.kept_loads)}")
-            load, limit = LOADS[name], self.limits.get(name)
+            load, limit = every[name], self.limits.get(name)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, inexact = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = Sample(name, load.unit, limit, nominal, values, inexact, self.status, self.design)
@@ -202,7 +211,8 @@ class View:
 
     def simulated(self, name: str) -> FloatArray:
         """Largest load of each joint that has results, those of unsettled joints included, SI; NaN without, (n,)."""
-        return np.asarray(np.maximum.reduce([LOADS[name].of(part.results) for part in self.parts]))
+        load = loads_of(self.mechanism)[name]
+        return np.asarray(np.maximum.reduce([load.of(part.results) for part in self.parts]))
 
     def loads(self, names: Sequence[str]) -> list[Sample]:
         """Several loads; see `load`."""
@@ -211,12 +221,12 @@ class View:
     @cached_property
     def kept_loads(self) -> tuple[str, ...]:
         """Loads that the study keeps."""
-        return tuple(name for name in LOADS if holds(self.columns, name))
+        return tuple(name for name, load in loads_of(self.mechanism).items() if holds(self.columns, load))
 
     @cached_property
     def bushing_loads(self) -> tuple[str, ...]:
-        """Loads of `loads.SHOWN_LOADS` that the study keeps."""
-        return tuple(name for name in SHOWN_LOADS if name in self.kept_loads)
+        """Loads of `loads.shown_loads` that the study keeps."""
+        return tuple(name for name in shown_loads(self.mechanism) if name in self.kept_loads)
 
     @property
     def shown_loads(self) -> tuple[str, ...]:
@@ -235,20 +245,21 @@ class View:
     @property
     def together(self) -> Sample:
         """Largest ratio of load to limit of each joint over all limits of the study; above 1, a limit is exceeded."""
-        return self.load_of(Limit(ANY_LIMIT, tuple(self.limits), tuple(self.limits.values())))
+        return self.load_of(Limit(ANY_LIMIT, tuple(self.limits), tuple(self.limits.values()), self.mechanism))
 
     @cached_property
     def leading(self) -> tuple[str, ...]:
         """Leading load of each kind (force, torque, ...).
 
-        Candidates are the loads with limits or, without limits, those of `loads.SHOWN_LOADS` kept. The leading load is
+        Candidates are the loads with limits or, without limits, those of `loads.shown_loads` kept. The leading load is
         the one whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the
         limit (without limits by the 99 % quantile).
         """
         by_kind: dict[str, tuple[tuple[float, float], str]] = {}
         for load in self.loads(list(self.limits) or self.bushing_loads):
             if load.valid.size:
-                kind, candidate = LOADS[split(load.name)[0]].kind.key, (worst.rank(load, load.limit), load.name)
+                kind = load_of(load.name, self.mechanism).kind.key
+                candidate = worst.rank(load, load.limit), load.name
                 by_kind[kind] = max(by_kind.get(kind, candidate), candidate, key=lambda item: item[0])
         return tuple(name for _, name in by_kind.values())
 
@@ -262,7 +273,9 @@ class View:
         """The leading load whose limit the largest share of the joints exceeds; see `leading`."""
         shares = {load.name: load.above(load.limit).estimate for load in self.loads(self.leading) if load.limit}
         known = {name: share for name, share in shares.items() if share == share}
-        return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
+        if known:
+            return max(known, key=lambda name: known[name])
+        return (*self.leading, *shown_loads(self.mechanism))[0]
 
     def point_of(self, name: str) -> str:
         """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.

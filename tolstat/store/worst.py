@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import Column, Inexact, frozen, largest
 from tolstat.analysis.sample import Sample, is_valid
-from tolstat.common.loads import LOAD_FIELDS, FloatArray, Load, Results
-from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
+from tolstat.common.loads import FloatArray, Load, Results, load_fields
+from tolstat.common.tables import FAILED, UNSETTLED, VALID, Status, deciding, tables, without_results, worst_status
 from tolstat.store.reader import Reader
 
 AT_ONCE = 16_384
@@ -27,7 +27,7 @@ def together(parts: Sequence[Results]) -> Columns:
     Parameters
     ----------
     parts : sequence of Results
-        Results at each operating point, with `LOAD_FIELDS` at least.
+        Results at each operating point, with `loads.load_fields` at least.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def load_of(parts: Sequence[Results], load: Load) -> tuple[Column, NDArray[np.ui
     Parameters
     ----------
     parts : sequence of Results
-        Results at each operating point, with `LOAD_FIELDS` at least.
+        Results at each operating point, with `loads.load_fields` at least.
     load : Load
         The load.
 
@@ -94,15 +94,13 @@ def rank(load: Sample, limit: float | None) -> tuple[float, float]:
 
 
 class Columns(dict[str, NDArray[Any]]):
-    """Columns `LOAD_FIELDS` of results, each made when it is first asked for, and not writeable."""
+    """Columns of results that loads are read from, each made when it is first asked for, and not writeable."""
 
     def __init__(self, make: Callable[[str], NDArray[Any]]) -> None:
         super().__init__()
         self._make = make
 
     def __missing__(self, name: str) -> NDArray[Any]:
-        if name not in LOAD_FIELDS:
-            raise KeyError(name)
         return self.setdefault(name, frozen(self._make(name)))
 
 
@@ -114,7 +112,8 @@ def columns_of(store: Reader) -> Columns:
 def _column(store: Reader, name: str) -> NDArray[Any]:
     """Column of the results of the samples of a file at one operating point."""
     skip = store.first_sample
-    values = np.empty((store.n - skip, *RESULT[name].shape), RESULT[name].base, "F")
+    dtype = tables(store.mechanism).RESULT[name]
+    values = np.empty((store.n - skip, *dtype.shape), dtype.base, "F")
     for slots in _slots(store):
         values[slots.start - skip : slots.stop - skip] = store.results(slots, (name,))[name]
     return values
@@ -132,8 +131,9 @@ def nominal(stores: Sequence[Reader]) -> NDArray[np.void]:
     at_each = [table[np.isin(table["status"], VALID)] for table in at_each]
     if len(stores) == 1:
         return frozen(at_each[0])
-    joint = without_results(int(all(map(len, at_each))), Status.OK)
-    for name in LOAD_FIELDS if joint.size else ():
+    mechanism = stores[0].mechanism
+    joint = without_results(int(all(map(len, at_each))), Status.OK, mechanism)
+    for name in load_fields(mechanism) if joint.size else ():
         joint[name] = together(at_each)[name]
     return frozen(joint)
 
@@ -152,15 +152,16 @@ def without_load(status: Sequence[NDArray[np.uint8]], stores: Sequence[Reader]) 
     points = deciding([at_point[samples] for at_point in status]).tolist()
     slots = (samples + stores[0].first_sample).tolist()
     each = [stores[point].results(slice(slot, slot + 1)) for point, slot in zip(points, slots, strict=True)]
-    return frozen(np.concatenate([np.empty(0, RESULT), *each]))
+    return frozen(np.concatenate([np.empty(0, tables(stores[0].mechanism).RESULT), *each]))
 
 
 def mode_share(store: Reader) -> FloatArray:
-    """Mean over the valid joints at one operating point, (4, 4); NaN if none is valid or it is not kept."""
-    total, shares = 0, np.zeros((4, 4))
+    """Mean over the valid joints at one operating point, (pins, modes); NaN if none is valid or it is not kept."""
+    shape = tables(store.mechanism).RESULT["mode_share"].shape
+    total, shares = 0, np.zeros(shape)
     for slots in _slots(store):
         block = store.results(slots, ("status", "mode_share"))
         valid = np.isin(block["status"], VALID)
         shares += block["mode_share"][valid].sum(axis=0)
         total += int(valid.sum())
-    return frozen(shares / total if total else np.full((4, 4), np.nan))
+    return frozen(shares / total if total else np.full(shape, np.nan))

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import Kind, kinds, places
 from tolstat.common.mechanism import Mechanism
 
@@ -53,7 +52,7 @@ class LoadHistory(NamedTuple):
 
 FORCES_AND_TORQUES = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 """Components of a bushing's loads."""
-OF_BUSHINGS, OF_SHAFTS = "loads", "shafts"
+BUSHING_LOADS, SHAFT_LOADS = "loads", "shafts"
 """Names of the histories."""
 
 
@@ -64,7 +63,7 @@ def load_histories(mechanism: Mechanism) -> dict[str, LoadHistory]:
     of_bushings, of_shafts = _in_words(bushings), " and ".join(shafts)
     found = (
         LoadHistory(
-            OF_BUSHINGS,
+            BUSHING_LOADS,
             "",
             bushings,
             FORCES_AND_TORQUES,
@@ -73,7 +72,7 @@ def load_histories(mechanism: Mechanism) -> dict[str, LoadHistory]:
             f"of bushings {of_bushings} in turn: force e, t, z, torque e, t, z",
         ),
         LoadHistory(
-            OF_SHAFTS,
+            SHAFT_LOADS,
             "shaft_",
             shafts,
             ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z"),
@@ -210,7 +209,7 @@ AROUND = 24
 two of them is at most 1 - cos(3.75 deg), 0.2 %, above theirs."""
 
 
-def signals_of(name: str, mechanism: Mechanism = CARDAN) -> tuple[Signal, ...]:
+def signals_of(name: str, mechanism: Mechanism) -> tuple[Signal, ...]:
     """Signals of a name: of a component, ``cross1.F_t``; along a direction, ``cross1.F at 30 deg``, ``... at worst``.
 
     The angle is from the first component of `planes` towards the second.
@@ -225,19 +224,12 @@ def signals_of(name: str, mechanism: Mechanism = CARDAN) -> tuple[Signal, ...]:
     return tuple(first._replace(name=name, factors=tuple(each)) for each in factors.tolist())
 
 
-def unit_of(name: str, mechanism: Mechanism = CARDAN) -> str:
+def unit_of(name: str, mechanism: Mechanism) -> str:
     """SI unit of a signal, by its name."""
     return signals_of(name, mechanism)[0].unit
 
 
-def histories_of(names: Iterable[str], mechanism: Mechanism = CARDAN) -> tuple[LoadHistory, ...]:
+def histories_of(names: Iterable[str], mechanism: Mechanism) -> tuple[LoadHistory, ...]:
     """Histories that channels follow from, in the order of `load_histories`."""
     used = {channels(mechanism)[name].history for name in names}
     return tuple(history for history in load_histories(mechanism).values() if history in used)
-
-
-MEASURING = tuple(kind for kind in followed(CARDAN) if not kind.measure)
-LOAD_HISTORIES = tuple(load_histories(CARDAN).values())
-BUSHING_LOADS, SHAFT_LOADS = LOAD_HISTORIES
-CHANNELS, COMPONENTS, PLANES = channels(CARDAN), components(CARDAN), planes(CARDAN)
-"""Those of the Cardan joint."""

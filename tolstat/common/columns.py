@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
 from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import kinds
-from tolstat.common.loads import loads_of
+from tolstat.common.loads import Load
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import DESIGN_FIELDS, LEDGER_FIELDS, tables
 
@@ -77,14 +76,14 @@ def optional_columns(mechanism: Mechanism) -> tuple[Column, ...]:
     return tuple(column for column in result_columns(mechanism) if column.field in optional)
 
 
-def kept_names(names: Iterable[str], mechanism: Mechanism = CARDAN) -> list[str] | None:
+def kept_names(names: Iterable[str], mechanism: Mechanism) -> list[str] | None:
     """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
     optional = [c.name for c in optional_columns(mechanism)]
     among = [name for name in optional if name in set(names)]
     return None if among == optional else among
 
 
-def kept_columns(identity: Mapping[str, Any], mechanism: Mechanism = CARDAN) -> tuple[Column, ...]:
+def kept_columns(identity: Mapping[str, Any], mechanism: Mechanism) -> tuple[Column, ...]:
     """Columns of the results that a campaign keeps, in the order of the table.
 
     Parameters
@@ -108,7 +107,7 @@ def kept_columns(identity: Mapping[str, Any], mechanism: Mechanism = CARDAN) -> 
     return tuple(c for c in columns if c not in optional or c.name in names)
 
 
-def blank_others(results: NDArray[np.void], kept: Iterable[Column], mechanism: Mechanism = CARDAN) -> None:
+def blank_others(results: NDArray[np.void], kept: Iterable[Column], mechanism: Mechanism) -> None:
     """Write NaN to the columns of a table RESULT that are not in `kept`; all of these have type f8."""
     names = {c.name for c in kept}
     for c in result_columns(mechanism):
@@ -116,9 +115,9 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column], mechanism: M
             c.of(results)[:] = np.nan
 
 
-def holds(kept: Iterable[Column], load: str, mechanism: Mechanism = CARDAN) -> bool:
+def holds(kept: Iterable[Column], load: Load) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
-    return {c.name for c in kept}.issuperset(loads_of(mechanism)[load].columns)
+    return {c.name for c in kept}.issuperset(load.columns)
 
 
 SUBSET_FIELDS = (
@@ -142,9 +141,3 @@ def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
         The attribute ``sampling`` of a result file.
     """
     return flat(SUBSET_FIELDS) if sampling["method"] == "subset" else ()
-
-
-ERROR_COLUMNS, RESULT_COLUMNS = error_columns(CARDAN), result_columns(CARDAN)
-OPTIONAL_FIELDS = tuple(dict.fromkeys(column.field for column in optional_columns(CARDAN)))
-RESULT_NAMES = tuple(column.name for column in RESULT_COLUMNS)
-"""Those of the Cardan joint."""

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
 from tolstat.common.fields import Field
 from tolstat.common.mechanism import Mechanism
 
@@ -268,9 +267,3 @@ def sizes(mechanism: Mechanism) -> Sizes:
 def measure_of(kind: Kind) -> Kind:
     """Kind whose largest value errors and changes of a load are relative to."""
     return kind.measure or kind
-
-
-PLACES, KIND, SPAN = places(CARDAN), kinds(CARDAN), spans(CARDAN)
-LOAD_KINDS = tuple(KIND.values())
-BUSHINGS, PINS, SHAFTS = KIND["F"].places, KIND["contact"].places, KIND["axial"].places
-"""Those of the Cardan joint."""

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import Kind, Place, kinds, places, spans
 from tolstat.common.mechanism import Mechanism
 
@@ -83,7 +82,7 @@ def loads_of(mechanism: Mechanism) -> dict[str, Load]:
     return {load.name: load for load in found}
 
 
-def load_of(name: str, mechanism: Mechanism = CARDAN) -> Load:
+def load_of(name: str, mechanism: Mechanism) -> Load:
     """Load that a name is about, whatever operating points it names."""
     return loads_of(mechanism)[split(name)[0]]
 
@@ -124,7 +123,7 @@ class Limit(NamedTuple):
     name: str
     loads: tuple[str, ...]
     levels: tuple[float, ...]
-    mechanism: Mechanism = CARDAN
+    mechanism: Mechanism
 
     @property
     def has_one_level(self) -> bool:
@@ -161,12 +160,12 @@ def of_kind(results: Results, kind: Kind) -> FloatArray:
     return values.reshape(len(values), len(kind.loads()))
 
 
-def largest(results: NDArray[np.void], mechanism: Mechanism = CARDAN) -> FloatArray:
+def largest(results: NDArray[np.void], mechanism: Mechanism) -> FloatArray:
     """Largest values of all kinds, (n, values), SI, in the order of `load_kinds.spans`."""
     return np.concatenate([results[f"{key}_max"].reshape(len(results), -1) for key in kinds(mechanism)], axis=1)
 
 
-def put_largest(values: FloatArray | float, results: NDArray[np.void], mechanism: Mechanism = CARDAN) -> None:
+def put_largest(values: FloatArray | float, results: NDArray[np.void], mechanism: Mechanism) -> None:
     """Write largest values, ordered as `largest` returns them, or one value for all, to a table RESULT."""
     values = np.broadcast_to(values, (len(results), max(span.stop for span in spans(mechanism).values())))
     for key, span in spans(mechanism).items():
@@ -174,7 +173,7 @@ def put_largest(values: FloatArray | float, results: NDArray[np.void], mechanism
         field[...] = values[:, span].reshape(field.shape)
 
 
-def names_of(group: str, kind: Kind, mechanism: Mechanism = CARDAN) -> tuple[str, ...]:
+def names_of(group: str, kind: Kind, mechanism: Mechanism) -> tuple[str, ...]:
     """Names of the loads of a kind at the places of a group, ``"cross"``."""
     found = loads_of(mechanism).items()
     return tuple(name for name, load in found if load.kind == kind and load.place.group == group)
@@ -193,7 +192,7 @@ def unit_text(unit: str) -> str:
     return {"N*m": "N m", "1": ""}.get(unit, unit)
 
 
-def limits_in_words(limits: Mapping[str, float], mechanism: Mechanism = CARDAN) -> str:
+def limits_in_words(limits: Mapping[str, float], mechanism: Mechanism) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
@@ -211,8 +210,3 @@ ANY_LIMIT = "any limit"
 def load_fields(mechanism: Mechanism) -> tuple[str, ...]:
     """Fields of the results that loads and their intervals are read from, and the status."""
     return ("status", *(f"{key}_{of}" for key in kinds(mechanism) for of in ("max", "lower", "upper")))
-
-
-LOADS, SHOWN_LOADS, LOAD_FIELDS, PANELS = loads_of(CARDAN), shown_loads(CARDAN), load_fields(CARDAN), panels(CARDAN)
-UNIT_OF_LOAD, UNIT_OF_LIMIT = units_of_loads(CARDAN), units_of_limits(CARDAN)
-"""Those of the Cardan joint."""

@@ -16,13 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import CARDAN
 from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.common.parameters import numbers, param_fields
 
-SCHEMA_VERSION = 12
+SCHEMA_VERSION = 13
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""
@@ -355,7 +354,7 @@ def tables(mechanism: Mechanism) -> Tables:
     )
 
 
-def blank_params(n: int, mechanism: Mechanism = CARDAN) -> NDArray[np.void]:
+def blank_params(n: int, mechanism: Mechanism) -> NDArray[np.void]:
     """Return `n` rows of PARAM that hold the numbers of the mechanism, and zeros."""
     params = np.zeros(n, tables(mechanism).PARAM)
     for name, values in numbers(mechanism).items():
@@ -376,12 +375,12 @@ def _layouts(fields: tuple[Field, ...], of: Mapping[str, Kind]) -> tuple[np.dtyp
     return dtype_of([*others, *chain.from_iterable(of_loads.values())]), dtype_of([*others, *joined])
 
 
-def for_kernels(table: NDArray[np.void], mechanism: Mechanism = CARDAN) -> np.recarray[Any, np.dtype[np.void]]:
+def for_kernels(table: NDArray[np.void], mechanism: Mechanism) -> np.recarray[Any, np.dtype[np.void]]:
     """View of a table RESULT, of any shape, as KERNEL_RESULT."""
     return table.view(np.ndarray).view(tables(mechanism).KERNEL_RESULT).view(np.recarray)
 
 
-def without_results(n: int, status: Status, mechanism: Mechanism = CARDAN) -> NDArray[np.void]:
+def without_results(n: int, status: Status, mechanism: Mechanism) -> NDArray[np.void]:
     """Return the rows of `n` joints without results, (n,), dtype RESULT: NaN, and `status`."""
     results = np.zeros(n, tables(mechanism).RESULT)
     for field in tables(mechanism).result_fields:
@@ -404,8 +403,3 @@ def to_names(options: Options) -> dict[str, Any]:
 def from_names(values: Mapping[str, Any]) -> Options:
     """Return the options that `to_names` has written."""
     return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in values.items()})
-
-
-ERROR_FIELDS, RESULT_FIELDS, ERROR, PARAM, RESULT, KERNEL_RESULT = tables(CARDAN)
-HOLES = tuple(name for name in features(CARDAN) if name.startswith("hole"))
-"""Those of the Cardan joint."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.common.cardan import CARDAN
-from tolstat.common.channels import OF_BUSHINGS, OF_SHAFTS, LoadHistory, Signal, components, load_histories
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, Signal, components, load_histories
 from tolstat.common.load_kinds import CONTACTS, spans
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import HistorySpec, Options
@@ -58,9 +58,9 @@ def history_specs(
         contact += "stations"
         modes = f"contact mode of pins 1-{pins}: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
-            "loads": _of_samples(of[OF_BUSHINGS], n),
+            "loads": _of_samples(of[BUSHING_LOADS], n),
             "contact": HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": _of_samples(of[OF_SHAFTS], n),
+            "shafts": _of_samples(of[SHAFT_LOADS], n),
             "mode": HistorySpec((n, pins), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
@@ -82,7 +82,7 @@ def extracted(
         fields = {name: samples["loads"][:, span] for name, span in spans(mechanism).items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    fields = {OF_BUSHINGS: samples["components"], OF_SHAFTS: samples["shafts"]}
+    fields = {BUSHING_LOADS: samples["components"], SHAFT_LOADS: samples["shafts"]}
     loads = {name: np.ascontiguousarray(values) for name, values in fields.items()}
     sample = cycles(loads, mechanism) if "cycles" in histories else {}
     if "harmonics" in histories:
@@ -125,7 +125,7 @@ def coefficients(
     dict
         By name of `specs`. Errors of all loads are relative to the largest bushing force and torque.
     """
-    bushing = loads[OF_BUSHINGS]
+    bushing = loads[BUSHING_LOADS]
     size = [np.linalg.norm(bushing[..., k : k + 3], axis=-1).max() for k in (0, 3)]
     coefficients: dict[str, NDArray[Any]] = {}
     for history in load_histories(mechanism).values():
@@ -326,7 +326,7 @@ def count(
     from tolstat.kernel.revolution import rainflow
 
     places, factors = _tables(signals, mechanism)
-    bushing = loads[OF_BUSHINGS]
+    bushing = loads[BUSHING_LOADS]
     sizes = [np.linalg.norm(bushing[..., part].astype(float), axis=-1).max() for part in (slice(3), slice(3, 6))]
     gates = GATE * (np.abs(factors) @ np.repeat(sizes, 3))
     histories = [loads[name] for name in load_histories(mechanism) if name in loads]

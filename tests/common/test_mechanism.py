@@ -9,10 +9,11 @@ import pytest
 
 from tests.support.graphs import cardan, free_tube
 from tests.support.mechanisms import body, triads, unknown
+from tests.support.of_cardan import PARAM
 from tolstat.common import files
 from tolstat.common.cardan import CARDAN, SERIES
 from tolstat.common.mechanism import Mechanism, blocks_of, numbering
-from tolstat.common.tables import PARAM, blank_params
+from tolstat.common.tables import blank_params
 
 FRAMES = {"C": "cross", "I": "input", "F": "output"}
 DIRECTIONS = {"+R x": (1, 0, 0), "−R x": (-1, 0, 0), "+R y": (0, 1, 0), "−R y": (0, -1, 0), "centre O": None}

@@ -11,9 +11,10 @@ from tests.measure import stability
 from tests.support import naive
 from tests.support.environment import ROOT
 from tests.support.mechanisms import N_DOF, N_LUMPS, S, body
+from tests.support.of_cardan import RESULT, SPAN
 from tolstat import joint as joints
-from tolstat.common.load_kinds import RESULTANT, SPAN
-from tolstat.common.tables import RESULT, Mode, Options, iterations_allowed
+from tolstat.common.load_kinds import RESULTANT
+from tolstat.common.tables import Mode, Options, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work

@@ -13,8 +13,9 @@ from tests.kernel.test_dynamics import OPTIONS, ORDERS, SHAFTS, loaded
 from tests.support import energy, naive
 from tests.support.kernel_energy import ENERGY, ENERGY_FIELDS
 from tests.support.mechanisms import N_DOF, PSI, body, lump_kind, triads
+from tests.support.of_cardan import PARAM
 from tolstat.common.cardan import CARDAN
-from tolstat.common.tables import PARAM, Method, Options, Status
+from tolstat.common.tables import Method, Options, Status
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import make_work

@@ -9,9 +9,10 @@ import pytest
 
 from tests.conftest import REFERENCE, joint_with_law, sliding
 from tests.support import kernel_states, trajectory
+from tests.support.of_cardan import PARAM, RESULT
 from tolstat import joint as joints
 from tolstat import sampling, study
-from tolstat.common.tables import PARAM, RESULT, Fidelity, Method, Options, Start, Status, iterations_allowed
+from tolstat.common.tables import Fidelity, Method, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype

@@ -7,13 +7,26 @@ import pytest
 
 from tests.support import synthetic
 from tests.support.mechanisms import N_DOF
+from tests.support.of_cardan import (
+    CHANNELS,
+    KERNEL_RESULT,
+    KIND,
+    LOAD_KINDS,
+    LOADS,
+    RESULT,
+    RESULT_COLUMNS,
+    RESULT_FIELDS,
+    SPAN,
+    for_kernels,
+    largest,
+    put_largest,
+    without_results,
+)
 from tolstat.common.cardan import CARDAN
-from tolstat.common.channels import CHANNELS
-from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.load_kinds import KIND, LOAD_KINDS, SPAN, load_numbers, measure_of, sizes
-from tolstat.common.loads import LOADS, largest, of_kind, put_largest
+from tolstat.common.load_kinds import load_numbers, measure_of, sizes
+from tolstat.common.loads import of_kind
 from tolstat.common.mechanism import numbering
-from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
+from tolstat.common.tables import Options, Status
 from tolstat.kernel.cardan import ideal_loads
 from tolstat.kernel.mechanics import dynamics, loads
 from tolstat.kernel.mechanics.work import make_work

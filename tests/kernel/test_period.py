@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.support.of_cardan import KERNEL_RESULT
 from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import load_numbers
-from tolstat.common.tables import KERNEL_RESULT, Options, Status
+from tolstat.common.tables import Options, Status
 from tolstat.kernel.mechanics.loads import OF_FORCES
 from tolstat.kernel.revolution.outcome import check_settled
 from tolstat.kernel.revolution.settle import ALL_LOADS, make_samples

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support import mechanisms
-from tolstat.common.tables import blank_params
+from tests.support.of_cardan import blank_params
 from tolstat.kernel.mechanics import rotation
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.trigonometry import sine_cosine

@@ -7,10 +7,9 @@ import pytest
 
 from tests.support import naive
 from tests.support.mechanisms import N_DOF, S, body
-from tolstat.common.channels import CHANNELS, COMPONENTS, SHAFT_LOADS
-from tolstat.common.load_kinds import ORDERS, SPAN
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import RESULT, Options, Status, for_kernels
+from tests.support.of_cardan import CHANNELS, COMPONENTS, LOADS, RESULT, SHAFT_LOADS, SPAN, for_kernels
+from tolstat.common.load_kinds import ORDERS
+from tolstat.common.tables import Options, Status
 from tolstat.kernel.mechanics import dynamics, loads
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.orders import write_orders

@@ -19,8 +19,9 @@ from studies.precision.measuring import in_turn
 from tests.measure.operations import count_apart
 from tests.support.kernel_states import UNLIMITED, Sample, Snapshot, dense, into_lanes, snapshots, tally
 from tests.support.mechanisms import N_DOF
+from tests.support.of_cardan import RESULT
 from tests.support.stepping import make_state
-from tolstat.common.tables import RESULT, Options
+from tolstat.common.tables import Options
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.lockstep import START_ONLY
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent

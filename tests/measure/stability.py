@@ -18,9 +18,10 @@ import numpy as np
 from tests.conftest import joint_with_law
 from tests.support import trajectory
 from tests.support.mechanisms import N_DOF, N_LUMPS, S
+from tests.support.of_cardan import RESULT
 from tests.support.stepping import CV_FACTORISED, H_OLD, advance, make_state, reset
 from tolstat import joint, sampling, study
-from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
+from tolstat.common.tables import SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.mechanics.work import make_work, work_dtype

@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import naive
+from tests.support.of_cardan import BUSHING_LOADS, SHAFT_LOADS
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
 from tolstat.common.cardan import CARDAN
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, components, load_histories, planes, signals_of
+from tolstat.common.channels import components, load_histories, planes, signals_of
 from tolstat.common.load_kinds import kinds
 from tolstat.solver import histories
 

@@ -11,10 +11,11 @@ from tests.support import fakes
 from tests.support.closed_forms import pin_force
 from tests.support.environment import ROOT
 from tests.support.mechanisms import bushing_kind
+from tests.support.of_cardan import RESULT, blank_params
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
-from tolstat.common.tables import RESULT, Fidelity, Options, Simulation, Status, blank_params
+from tolstat.common.tables import Fidelity, Options, Simulation, Status
 from tolstat.joint import ideal
 from tolstat.solver import fidelity
 from tolstat.solver.fidelity import Rung

@@ -14,11 +14,12 @@ from tests.solver.test_refinement import assert_same
 from tests.support import exceedance
 from tests.support.environment import ROOT
 from tests.support.mechanisms import lump_kind
+from tests.support.of_cardan import PARAM, RESULT
 from tolstat import joint, sampling, study
 from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import plan
-from tolstat.common.tables import PARAM, RESULT, Method, Options, Status, iterations_allowed
+from tolstat.common.tables import Method, Options, Status, iterations_allowed
 from tolstat.joint import ideal
 from tolstat.kernel.integrators.mesh import CELL, COARSEN_BELOW, COARSENING_REVS, FIRST_LEVEL, UNKNOWN, next_level
 from tolstat.solver import simulation, stationary

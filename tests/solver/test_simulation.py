@@ -12,11 +12,12 @@ from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tests.support.closed_forms import pin_force
 from tests.support.environment import ROOT
 from tests.support.mechanisms import lump_kind
+from tests.support.of_cardan import LOAD_KINDS, RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign.remedy import Reason, remedy
-from tolstat.common.load_kinds import LOAD_KINDS, RESULTANT, measure_of
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
+from tolstat.common.load_kinds import RESULTANT, measure_of
+from tolstat.common.tables import SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
 from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work

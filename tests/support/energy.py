@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import PARAM, Options, Status
+from tests.support.of_cardan import PARAM
+from tolstat.common.tables import Options, Status
 
 STORED = ("kinetic", "bushings", "contacts", "support")
 GAINS = {

@@ -20,22 +20,12 @@ import numpy as np
 import pytest
 
 from tests.support.environment import environment as environment
+from tests.support.of_cardan import ERROR, ERROR_FIELDS, PARAM, RESULT, RESULT_FIELDS, kept_columns
 from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
-from tolstat.common.columns import KEPT, Column, kept_columns
+from tolstat.common.columns import KEPT, Column
 from tolstat.common.counts import Counts
-from tolstat.common.tables import (
-    DESIGN,
-    ERROR,
-    ERROR_FIELDS,
-    PARAM,
-    RESULT,
-    RESULT_FIELDS,
-    HistorySpec,
-    Options,
-    Simulation,
-    Status,
-)
+from tolstat.common.tables import DESIGN, HistorySpec, Options, Simulation, Status
 from tolstat.joint import Operation
 from tolstat.joint.model import leaves
 from tolstat.solver import stationary

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.precision.measuring import parameters
+from tests.support.of_cardan import RESULT, for_kernels
 from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import RESULT, Fidelity, Method, Options, for_kernels
+from tolstat.common.tables import Fidelity, Method, Options
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:

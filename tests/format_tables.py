@@ -12,13 +12,14 @@ from pathlib import Path
 
 from tests import study_reference
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import (
     DESIGN_COLUMNS,
-    ERROR_COLUMNS,
     LEDGER_COLUMNS,
-    RESULT_COLUMNS,
     Column,
     drawn_columns,
+    error_columns,
+    result_columns,
 )
 from tolstat.joint.derived import DERIVED
 from tolstat.store import layout
@@ -101,7 +102,7 @@ def documents() -> dict[Path, str]:
     parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS, "origin subset": origin}
     content = {name: field_table(columns) for name, columns in parts.items()}
     content |= {"status": status_table(), "session": session_table(), "axes": axis_table()}
-    page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
+    page = {"errors": field_table(error_columns(CARDAN)), "results": field_table(result_columns(CARDAN))}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
         MODEL: updated(MODEL.read_text(encoding="utf-8"), {"derived": derived_table()}),

@@ -6,10 +6,11 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from tolstat.common.columns import OPTIONAL_FIELDS, RESULT_COLUMNS
-from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.loads import LOADS, UNIT_OF_LIMIT
-from tolstat.common.tables import ERROR_FIELDS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.columns import optional_columns
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import loads_of, units_of_limits
+from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
 from tolstat.study import schema
@@ -20,7 +21,7 @@ from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
-from tolstat.study.selection import TOLERANCED
+from tolstat.study.selection import toleranced_units
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -128,7 +129,8 @@ def _joint_sections(made: Mapping[str, Any], before: str) -> Iterator[str]:
 def distributions() -> Iterator[str]:
     """Entries of [tolerances], one after another."""
     of: dict[str, tuple[Any, list[str]]] = {}
-    for name in TOLERANCED:
+    toleranced = toleranced_units(CARDAN)
+    for name in toleranced:
         if name.partition(".")[2] in ZONES:
             continue
         for word, model in kinds_of(name).items():
@@ -139,7 +141,7 @@ def distributions() -> Iterator[str]:
         own = {key: v for key, v in made["properties"].items() if key not in told}
         band = [f"`{key}`" for key in BAND if key in made["properties"]]
         text = f"#### `{word}`\n\n{made['description']}"
-        if len(names) < len(TOLERANCED) / 2:
+        if len(names) < len(toleranced) / 2:
             text += f" For {', '.join(f'`{key}`' for key in dict.fromkeys(n.partition('.')[2] for n in names))} only."
         text += f" Band: {', '.join(band)}." if band else ""
         yield text + (f"\n\n{key_table(own, made['required'])}" if own else "")
@@ -156,7 +158,7 @@ def errors() -> str:
     """Table of the names of errors."""
     lines = ["| name | unit | meaning |", "|---|---|---|"]
     meanings: dict[tuple[str, str, str], list[str]] = {}
-    for field in ERROR_FIELDS:
+    for field in tables_of(CARDAN).error_fields:
         feature, _, half = field.name.partition(".")
         text = field.description.replace("the pin's", "the").replace("the pin axis", "the axis")
         text = text.replace("the hole's", "the").replace("the hole axis", "the axis")
@@ -171,8 +173,8 @@ def errors() -> str:
 def loads() -> str:
     """Table of the loads that can have a limit."""
     lines = ["| load | unit | meaning |", "|---|---|---|"]
-    for of in LOAD_KINDS:
-        names = [name for name in UNIT_OF_LIMIT if LOADS[name].kind == of]
+    for of in kinds(CARDAN).values():
+        names = [name for name in units_of_limits(CARDAN) if loads_of(CARDAN)[name].kind == of]
         if not names:
             continue
         text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
@@ -183,9 +185,8 @@ def loads() -> str:
 def results() -> str:
     """Sentence with the names of the result columns that can be left out."""
     found: dict[str, list[str]] = {}
-    for column in RESULT_COLUMNS:
-        if column.field in OPTIONAL_FIELDS:
-            found.setdefault(column.field, []).append(column.name)
+    for column in optional_columns(CARDAN):
+        found.setdefault(column.field, []).append(column.name)
     return (
         "Columns: "
         + ", ".join(f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "") for names in found.values())

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import SUBSET
 from tolstat.common.late import special
-from tolstat.common.tables import ERROR_FIELDS
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import tables
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
@@ -25,8 +26,6 @@ from tolstat.study.tolerances.zone_laws import plane_scores
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
 
-
-ERROR_NAMES = tuple(field.name for field in ERROR_FIELDS)
 BLOCK = 1 << 16
 """Number of rows drawn at a time: a table of 27 MB."""
 
@@ -48,7 +47,7 @@ def draw(study: Study, rows: range | None = None) -> Table:
         other rows are samples 0, 1, 2, ...
     """
     rows = range(study.rows) if rows is None else rows
-    table = nominal_errors(len(rows))
+    table = nominal_errors(len(rows), study.mechanism)
     numbers = study.sampling.samples(rows)
     samples = table[len(rows) - len(numbers) :]
     for name, value in study.errors.items():
@@ -119,7 +118,7 @@ def from_probabilities(study: Study, u: Array) -> Table:
     -------
     ndarray, (n,), dtype ERROR
     """
-    table = nominal_errors(len(u))
+    table = nominal_errors(len(u), study.mechanism)
     for name, value in study.errors.items():
         table[name] = value
     inside = np.clip(np.ascontiguousarray(u.T), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
@@ -175,7 +174,7 @@ def normal_scores(study: Study, errors: Table) -> dict[str, Array]:
 
 
 def _vector(study: Study, errors: Table, name: str) -> Array:
-    feature, _, key = name.partition(".")
+    feature, _, key = name.rpartition(".")
     return study.axes[feature].vector(errors, key)
 
 
@@ -189,19 +188,19 @@ def streams(study: Study) -> list[str]:
     return list(dict.fromkeys(stream for name in study.tolerances for stream in axes.streams_of(name)))
 
 
-def dimensions() -> dict[str, int]:
+def dimensions(mechanism: Mechanism) -> dict[str, int]:
     """Sobol' dimension of each error: its position in the table ERROR, whichever errors scatter in a study.
 
     A new error changes the Sobol' draws of all others: SciPy's scrambling depends on the number of dimensions.
     """
-    return {field.name: number for number, field in enumerate(ERROR_FIELDS)}
+    return {field.name: number for number, field in enumerate(tables(mechanism).error_fields)}
 
 
 def _fill_grid(samples: Table, study: Study, numbers: range) -> None:
     """Set the points of the product grid of the axes, the last of which varies fastest; dimensions are no errors."""
     index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in study.sweep])
     for axis, at in zip(study.sweep, index, strict=True):
-        for name in set(axis.names).intersection(ERROR_NAMES):
+        for name in set(axis.names).intersection(samples.dtype.names or ()):
             samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at] - _nominal(study.operation, name)
 
 
@@ -258,7 +257,7 @@ def _fill_from(samples: Table, study: Study, u: dict[str, Array], of_lots: Mappi
             vector = np.array([drawn * np.cos(direction), drawn * np.sin(direction)])
         else:
             vector = axes.of_component(name, drawn)
-        feature, _, key = name.partition(".")
+        feature, _, key = name.rpartition(".")
         vectors.setdefault(feature, {})[key] = vector
     for feature, parts in vectors.items():
         study.axes[feature].fill(samples, parts)
@@ -280,8 +279,9 @@ def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) 
     """Sobol' points, or points of a Latin hypercube, of one replicate; the first is that of a study without others."""
     seed, n = study.sampling.seed, study.samples // study.sampling.replicates
     if study.sampling.method == "sobol":
-        points = sobol(len(numbers), len(ERROR_FIELDS), [seed, replicate] if replicate else seed, numbers.start)
-        return {name: points[:, dimensions()[name]] for name in names}
+        column = dimensions(study.mechanism)
+        points = sobol(len(numbers), len(column), [seed, replicate] if replicate else seed, numbers.start)
+        return {name: points[:, column[name]] for name in names}
     suffix = f" {replicate}" if replicate else ""
     here = slice(numbers.start, numbers.stop)
     return {name: _stratified(n, _stream(seed, f"lhs {name}{suffix}"))[here] for name in names}

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from studies.cirelli2021.evidence import Evidence
 from studies.cirelli2021.statements import answers
-from studies.cirelli2021.tables import OUTPUT_SIDE
-from tolstat.common.load_kinds import BUSHINGS
+from studies.cirelli2021.tables import BUSHINGS, OUTPUT_SIDE
 
 Array = NDArray[np.float64]
 

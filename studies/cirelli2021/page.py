@@ -23,7 +23,6 @@ from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_main import revolutions
 from studies.cirelli2021.page_source import PaperStudy
 from tolstat.common.files import atomic_write
-from tolstat.common.load_kinds import BUSHINGS
 from tolstat.display import style, text
 
 DPI = 110
@@ -179,7 +178,7 @@ def grids(study: PaperStudy) -> list[Grid]:
                 cells = [_cell(float(p), float(x)) for p, x in pairs]
                 lines.append(Line(case, match.case, match.ties, match.distance, cells))
             title = f"{'cross' if column == 0 else 'fork'} bushings, α = {np.degrees(alpha):.0f}°"
-            found.append(Grid(int(table.tables[a, column]), title, list(BUSHINGS[part]), lines))
+            found.append(Grid(int(table.tables[a, column]), title, list(paper.BUSHINGS[part]), lines))
     return sorted(found)
 
 

@@ -79,7 +79,7 @@ def bushings(study: PaperStudy, which: tuple[int, int], alpha: float, numbers: s
     study : PaperStudy
         The study.
     which : tuple of int
-        Indices of the bushings, see `load_kinds.BUSHINGS`.
+        Indices of the bushings, see `tables.BUSHINGS`.
     alpha : float
         Misalignment, rad.
     numbers : str

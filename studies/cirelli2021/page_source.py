@@ -16,7 +16,8 @@ from studies.cirelli2021 import statics as paper_statics
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Answer
 from studies.cirelli2021.page_main import Main, revolutions
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.columns import result_columns
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, operating, varied
 from tolstat.questions.sweep import relative_errors
@@ -160,7 +161,7 @@ class PaperStudy:
 
 def matching(store: ResultFile) -> bool:
     """Whether a file is a complete study of the paper's cases with all results and with what the page draws."""
-    if store.columns != RESULT_COLUMNS or not store.case_names or not store.complete:
+    if store.columns != result_columns(CARDAN) or not store.case_names or not store.complete:
         return False
     if not {"loads", "contact", "tau"} <= set(store.history_specs):
         return False

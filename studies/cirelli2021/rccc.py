@@ -261,7 +261,7 @@ def solve(
     row = perturb(joint, operation, np.atleast_1d(errors))
     if len(row) != 1:
         raise ValueError(f"errors holds {len(row)} joints: give one row")
-    alpha, torque, radius = (float(row[name][0]) for name in ("alpha", "torque", "R"))
+    alpha, torque, radius = (row[name].item() for name in ("alpha", "torque", "R"))
     if not abs(alpha) < np.pi / 2:
         raise ValueError(f"alpha is {np.degrees(alpha):g} deg: give less than 90 deg")
     theta = np.atleast_1d(np.asarray(theta, float))

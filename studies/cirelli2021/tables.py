@@ -14,11 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import kinds
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
 
+BUSHINGS = kinds(CARDAN)["F"].places
+"""Bushings of the joint, in the order of its loads."""
 OUTPUT_SIDE = tuple(BUSHINGS.index(name) for name in ("cross1", "cross2", "fork3", "fork4"))
 INPUT_SIDE = tuple(BUSHINGS.index(name) for name in ("cross3", "cross4", "fork1", "fork2"))
 CROSS, FORK = slice(0, 4), slice(4, 8)
@@ -38,7 +41,7 @@ class Printed(NamedTuple):
     alpha : ndarray, shape (2,)
         Misalignments, rad.
     gamma : ndarray, shape (4, 2, 8, 2)
-        Case, misalignment, bushing (order of `load_kinds.BUSHINGS`), force and torque; per cent.
+        Case, misalignment, bushing (order of `BUSHINGS`), force and torque; per cent.
     tables : ndarray of int, shape (2, 2)
         Number of the paper's table: misalignment; cross and fork.
     """

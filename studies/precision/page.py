@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from studies.precision.measuring import markdown, versions
-from studies.precision.points import KINDS, build, cost, leaders
+from studies.precision.points import build, cost, leaders
 from studies.precision.runs import Run
 from studies.precision.setup import Setup
 from tolstat.common.files import atomic_write
@@ -121,7 +121,7 @@ def figure(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str) -> Figure:
 
 
 def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -> str:
-    """Compose the page in Markdown: figure, fastest contenders at each error, cost of an error, all points."""
+    """Compose the page in Markdown: figure, fastest contenders at each error, cost of an error."""
     own_error = f"median {truth['loads'].median():.0e}, worst {truth['loads'].max():.0e}"
     costs = cost(points, "loads", _levels(truth, "loads")).drop(columns="ours")
     parts = [
@@ -139,11 +139,10 @@ def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -
         "## Cost of an error",
         "Milliseconds of one core a joint, by error of the median joint.",
         _markdown(costs.set_axis(["", *(f"{level:.0e}" for level in costs.columns[1:])], axis=1)),
-        "## All points",
-        "`setting`: steps a revolution or rtol. `failed`, `over_time`: number of joints. `ms`: median over the joints. "
-        "`loads`, `contact`, `psi`: error of the median joint; `loads_worst`: that of the worst. `halvings`, `rates`: "
-        "mean number of halved steps and of calls of the right-hand side.",
-        _markdown(points.drop(columns=["ours", "joints", *(kind for kind in KINDS if kind not in LABELS)])),
+        "All points are in [`precision.csv`](precision.csv). `setting`: steps a revolution or rtol. `failed`, "
+        "`over_time`: number of joints. `ms`: median over the joints. `loads`, `contact`, `psi`: error of the median "
+        "joint; `loads_worst`: that of the worst. `halvings`, `rates`: mean number of halved steps and of calls of the "
+        "right-hand side.",
     ]
     return "\n\n".join(parts) + "\n"
 

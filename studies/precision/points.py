@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 
 from studies.precision.runs import TRUTH, Run
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
+from tolstat.common.load_kinds import kinds, measure_of, spans
 from tolstat.solver.reference import Largest
 
+SPAN = spans(CARDAN)
 KINDS = ("loads", *SPAN)
 """Columns with errors: the worst load that decides, and of each kind by its key."""
 
@@ -25,11 +27,11 @@ def errors(found: Largest, true: Largest) -> dict[str, float]:
         The worst of each kind, by its key; ``loads``: the worst of those that decide.
     """
     single = {}
-    for kind in LOAD_KINDS:
+    for kind in kinds(CARDAN).values():
         span = SPAN[kind.key]
         size = max(float(np.max(true[SPAN[measure_of(kind).key]])), 1e-300)
         single[kind.key] = float(np.max(np.abs(found[span] - true[span]))) / size
-    return {"loads": max(single[kind.key] for kind in LOAD_KINDS if kind.decides), **single}
+    return {"loads": max(single[kind.key] for kind in kinds(CARDAN).values() if kind.decides), **single}
 
 
 def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from studies.precision.integrators import Integrator, Outcome, solve
 from studies.precision.measuring import in_turn
 from tolstat.common import loads
+from tolstat.common.cardan import CARDAN
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import SIMULATED, Options, Status
 from tolstat.solver.compilation import warm_up
@@ -147,7 +148,7 @@ Job = OwnJob | OtherJob | TruthJob
 
 def largest_of(row: np.void) -> Largest | None:
     """Largest loads of a row of RESULT; None where it has none."""
-    return loads.largest(np.array([row]))[0] if Status(row["status"]) in SIMULATED else None
+    return loads.largest(np.array([row]), CARDAN)[0] if Status(row["status"]) in SIMULATED else None
 
 
 def prepare(system: FirstOrder) -> None:

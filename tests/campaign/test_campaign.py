@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from tests.support import fakes
+from tests.support.of_cardan import RESULT
 from tests.support.synthetic import HEAD
 from tolstat import joint
 from tolstat import study as studies
 from tolstat.campaign import blocks as execution
 from tolstat.campaign import run as campaign
-from tolstat.common import tables
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options
@@ -369,7 +369,7 @@ def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
             plan.output.harmonics,
         )
         results = store.results()[[4, 2]]
-        for name in tables.RESULT.names or ():
+        for name in RESULT.names or ():
             np.testing.assert_array_equal(results[name], again.results[name])
         for name in store.history_specs:
             np.testing.assert_array_equal(store.histories(name, np.array([4, 2])), again.histories[name])

@@ -17,11 +17,12 @@ import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.support import damage, fakes, synthetic
+from tests.support.of_cardan import ERROR, RESULT
 from tolstat import sampling
 from tolstat import study as studies
 from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
-from tolstat.common import files, tables
+from tolstat.common import files
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile, Writer, metadata
@@ -305,9 +306,9 @@ def test_large_campaigns_need_no_more_memory(tmp_path: Path) -> None:
         told = subprocess.run(python, capture_output=True, text=True, check=True, env=fakes.environment()).stdout
         measured.append(json.loads(told))
     growth = 1e6 * (measured[1]["parent_MB_at_most"] - measured[0]["parent_MB_at_most"])
-    whole = 80_000 * (tables.ERROR.itemsize + tables.RESULT.itemsize)
+    whole = 80_000 * (ERROR.itemsize + RESULT.itemsize)
     assert growth < 0.3 * whole
-    assert measured[1]["file_bytes_a_row"] < 1.02 * (tables.ERROR.itemsize + tables.RESULT.itemsize)
+    assert measured[1]["file_bytes_a_row"] < 1.02 * (ERROR.itemsize + RESULT.itemsize)
 
 
 def test_a_file_away_from_its_study_and_joint_file_is_extended(tmp_path: Path) -> None:

@@ -12,13 +12,13 @@ from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
 from tests.support import exceedance, fakes, synthetic
+from tests.support.of_cardan import LOADS, Limit
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
 from tolstat.analysis import binomial
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
-from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import Options, Status
 from tolstat.store import ResultFile
 

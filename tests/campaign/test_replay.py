@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.support import damage, synthetic
+from tests.support.of_cardan import PARAM
 from tests.support.reports import call
 from tolstat import sampling, study
 from tolstat.campaign import replay
@@ -18,7 +19,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common.columns import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
-from tolstat.common.tables import PARAM, Options, Simulation, Status
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.questions.causes.worst import joint_rows, largest_errors
 from tolstat.store import ResultFile, Writer, recorded
 

@@ -11,13 +11,13 @@ import pandas as pd
 import pytest
 
 from tests.support import damage, fakes, synthetic
+from tests.support.of_cardan import LOAD_KINDS
 from tests.support.reports import call
 from tolstat import joint, sampling, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.common.errors import InputError, NotApplicable, StoreError
-from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
 from tolstat.questions import joints as question
 from tolstat.questions.exceedance.answer import exceedance

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from studies.cirelli2021 import rccc, rccc_statics
 from tests.conftest import REFERENCE
 from tests.support.closed_forms import cross_couple, pin_force
-from tests.support.naive import ARM_AXES, ARM_OF_PIN, PIN_AXES, triad
+from tests.support.mechanisms import body, triads
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.joint import Operation, ideal, nominal_errors
 
 THETA = np.linspace(0, 2 * np.pi, 73) + 0.03
@@ -23,7 +24,7 @@ FEATURES = [f"{kind}{i}" for kind in ("pin", "hole") for i in (1, 2, 3, 4)]
 @pytest.fixture
 def errors():
     def make(alpha=15.0, seed=None, offset=2e-4, tilt=1e-2, **given):
-        table = nominal_errors(1)
+        table = nominal_errors(1, CARDAN)
         table["operation.alpha"] = np.radians(alpha)
         rng = np.random.default_rng(seed)
         for feature in FEATURES if seed is not None else ():
@@ -41,8 +42,8 @@ def errors():
 def features(errors, radius, pin):
     """Point and direction of a pin in the cross and of its hole in its fork."""
     found = []
-    for name, axes in ((f"pin{pin}", PIN_AXES[pin]), (f"hole{ARM_OF_PIN[pin]}", ARM_AXES[ARM_OF_PIN[pin]])):
-        local = triad(axes)
+    for name in (f"pin{pin}", f"hole{HOLE_OF_PIN[pin - 1]}"):
+        local = triads()[body(name)]
         shift = np.array([errors[f"{name}.offset_{axis}"][0] for axis in "etz"])
         turn = np.array([0.0, errors[f"{name}.tilt_t"][0], errors[f"{name}.tilt_z"][0]])
         found += [radius * local[0] + shift @ local, Rotation.from_rotvec(turn @ local).apply(local[0])]
@@ -347,7 +348,7 @@ def test_elastic_reference_joints_carry_the_couple_of_the_linkage(cirelli, error
         loads = file[f"{case}__loads"].astype(float)
     couple = np.zeros((180, 3))
     for k, pin in enumerate((1, 2)):
-        local = triad(PIN_AXES[pin])
+        local = triads()[body(f"pin{pin}")]
         force, torque = loads[:, k, :3] @ local, loads[:, k, 3:] @ local
         couple += torque + np.cross(cirelli.cross.r_b * local[0], force)
 

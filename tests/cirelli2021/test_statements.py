@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from studies.cirelli2021 import laws as paper_laws
 from studies.cirelli2021 import statements as paper_statements
 from studies.cirelli2021.evidence import Answer, Evidence, signed
-from tolstat.common.load_kinds import BUSHINGS
+from studies.cirelli2021.tables import BUSHINGS
 from tolstat.joint import Joint, load, varied
 from tolstat.joint.sections import PinBushing
 

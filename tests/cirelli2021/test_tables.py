@@ -16,8 +16,8 @@ from studies.cirelli2021 import distances as paper_distances
 from studies.cirelli2021 import spectra as paper_spectra
 from studies.cirelli2021 import statics as paper_statics
 from studies.cirelli2021 import tables as paper
-from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.tables import RESULT, Status
+from tolstat.common.cardan import CARDAN
+from tolstat.common.tables import Status, tables
 from tolstat.joint import ideal
 from tolstat.questions.sweep import relative_errors
 
@@ -53,7 +53,7 @@ def test_the_same_force_passes_pin_and_hole_in_the_printed_tables():
     """Cross bushing 1 and fork bushing 4 carry one contact, 2 and 3 the other: their Gamma_F agree."""
     gamma = paper.printed().gamma[..., 0]
     for cross, fork in (("cross1", "fork4"), ("cross2", "fork3")):
-        apart = np.abs(gamma[:, :, BUSHINGS.index(cross)] - gamma[:, :, BUSHINGS.index(fork)])
+        apart = np.abs(gamma[:, :, paper.BUSHINGS.index(cross)] - gamma[:, :, paper.BUSHINGS.index(fork)])
         assert apart[:, 1].max() <= 0.01
         assert apart[:, 0].max() <= 0.5
 
@@ -68,7 +68,7 @@ def test_speed_ratio_of_equation_2():
 
 
 def results(force, torque):
-    table = np.zeros(len(force), RESULT)
+    table = np.zeros(len(force), tables(CARDAN).RESULT)
     table["F_max"], table["T_max"] = np.asarray(force)[:, None], np.asarray(torque)[:, None]
     table["status"] = Status.OK
     return table
@@ -150,7 +150,7 @@ def test_distances_against_numpy_and_scipy():
     *_, nothing, output = paper_distances.distances(np.zeros_like(made))
     assert nothing.mean == pytest.approx(paper_choices.no_effect()) == pytest.approx(table.gamma.sum() / 128)
     assert np.isnan(nothing.correlation)
-    side = [BUSHINGS.index(name) for name in ("cross1", "cross2", "fork3", "fork4")]
+    side = [paper.BUSHINGS.index(name) for name in ("cross1", "cross2", "fork3", "fork4")]
     assert output.mean == pytest.approx(table.gamma[:, :, side].mean())
     assert [d.label for d in (four, nothing, output)] == ["Table 4", "all four", "output side only"]
 

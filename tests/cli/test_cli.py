@@ -18,7 +18,8 @@ from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import WorkerDied
 from tolstat.cli import LISTED
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Simulation, Status
 from tolstat.store import ResultFile
 
@@ -337,7 +338,10 @@ def test_dead_worker_is_no_fault_of_the_input(study, monkeypatch):
 def simulated(status, load):
     """Make a stand-in for a simulated case."""
     change = None if load is None else 0.5
-    loads = {name: {"unit": "N", "joint": load, "without_errors": 1.0, "change": change} for name in BUSHINGS}
+    loads = {
+        name: {"unit": "N", "joint": load, "without_errors": 1.0, "change": change}
+        for name in kinds(CARDAN)["F"].places
+    }
     facts = {"status": status, "status_without_errors": "ok", "closure": load, "max": loads}
     trace = pd.DataFrame({"theta": [0.0, 180.0], "tau": [1.0, 0.1 + 0.2]})
     return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace, remedy=lambda: "try more")

@@ -10,18 +10,22 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from tests.support.mechanisms import bushing_kind, lump_kind
 from tolstat import joint as joints
 from tolstat.common import files
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.common.errors import InputError
-from tolstat.common.fields import MAX_STATIONS
-from tolstat.common.load_kinds import PINS
+from tolstat.common.mechanism import features
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import validate
-from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM
+from tolstat.common.tables import tables
 from tolstat.joint import Joint, Operation, material
 from tolstat.joint.contact import LAWS
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, one_force
-from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
+PARAM, ERROR_FIELDS = tables(CARDAN).PARAM, tables(CARDAN).error_fields
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
+ARM_OF_PIN = [hole - 1 for hole in HOLE_OF_PIN]
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 MM = 1e-3
 
@@ -37,7 +41,7 @@ def operation():
 
 
 def one(**errors):
-    table = joints.nominal_errors(1)
+    table = joints.nominal_errors(1, CARDAN)
     for name, value in errors.items():
         table[name.replace("__", ".")] = value
     return table
@@ -194,7 +198,7 @@ def test_operation_is_validated():
 
 
 def test_nominal_joint(joint, operation):
-    p = joints.perturb(joint, operation, joints.nominal_errors(3))
+    p = joints.perturb(joint, operation, joints.nominal_errors(3, CARDAN))
     assert p.dtype == PARAM
     assert_allclose(p["alpha"], np.radians(15))
     assert_allclose(p["omega"], 500 * 2 * np.pi / 60)
@@ -202,14 +206,34 @@ def test_nominal_joint(joint, operation):
     assert_allclose(p["clearance"], 0.1 * MM, rtol=1e-12)
     assert_array_equal(p["pin_point"], 0.0)
     assert_array_equal(p["hole_point"], 0.0)
-    assert_array_equal(p["pin_axis"][0], [[0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]])
-    assert_array_equal(p["hole_axis"][0], [[1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0]])
-    assert_allclose(p["c_cross"][0, 0], 0.08 * np.sqrt(6.54e9 * 0.32))
-    assert_allclose(p["c_fork"][0, 3], 0.08 * np.sqrt(1.91e6 * joint.arm.inertia[0]))
+    for name in ("pin_axis", "hole_axis"):  # of each pair in axes of cross and fork, which coincide at theta = 0
+        assert_array_equal(p[name][0], [[0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]])
+    cross, *forks = (bushing_kind(name) for name in ("cross", "input fork", "output fork"))
+    assert_allclose(p["c"][0, cross, 0], 0.08 * np.sqrt(6.54e9 * 0.32))
+    assert_allclose(p["c"][0, forks, 3], 0.08 * np.sqrt(1.91e6 * joint.arm.inertia[0]))
     assert p["n_stations"][0] == 3
     assert_allclose(p["station_s"][0, :3], [11 * MM, 0.0, -11 * MM])
     assert_array_equal(p["station_weight"][0], [1, 0, 1] + [0] * (MAX_STATIONS - 3))
     assert all(np.isfinite(p[name]).all() for name in PARAM.names)
+
+
+def test_masses_stiffness_and_markers_are_those_of_their_parts(joint, operation):
+    """Along e, t and z of pin or arm, from the reference points of lump and base (docs/model.md, Bushings)."""
+    p = joints.perturb(joint, operation, joints.nominal_errors(1))[0]
+    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
+    for name, part, at in (("hub", joint.hub, 0.0), ("pin", joint.pin, R), ("arm", joint.arm, R)):
+        kind = lump_kind(name)
+        assert p["mass"][kind] == part.mass
+        assert_array_equal(p["inertia"][kind], part.inertia)
+        assert_array_equal(p["at"][kind], [at, 0, 0])
+    for name, stiffness, on_lump, on_base in (
+        ("cross", joint.k_cross, (r_b - R, 0, 0), (r_b, 0, 0)),
+        ("input fork", joint.k_fork, (0, 0, -l_f), (R, 0, -l_f)),
+        ("output fork", joint.k_fork, (0, 0, l_f), (R, 0, l_f)),
+    ):
+        kind = bushing_kind(name)
+        assert_array_equal(p["k"][kind], stiffness)
+        assert_array_equal(p["marker"][kind], [on_lump, on_base])
 
 
 def test_triads_are_right_handed_with_z_of_the_frame():
@@ -219,8 +243,8 @@ def test_triads_are_right_handed_with_z_of_the_frame():
             assert_array_equal(t, np.cross(z, e))
             assert_array_equal(np.cross(e, t), z)
     # at theta = 0 and alpha = 0 all frames coincide: a pin then points the way of the arm that takes it
-    for pin, arm in enumerate(ARM_OF_PIN):
-        assert_array_equal(PIN_TRIADS[pin], ARM_TRIADS[arm])
+    for pin, hole in enumerate(HOLE_OF_PIN):
+        assert_array_equal(PIN_TRIADS[pin], ARM_TRIADS[hole - 1])
 
 
 def test_offsets_and_tilts_by_hand(joint, operation):
@@ -231,17 +255,17 @@ def test_offsets_and_tilts_by_hand(joint, operation):
         ("pin2.offset_e", 1e-4): ("pin_point", 1, [0, -1e-4, 0]),
         ("pin3.offset_t", 1e-4): ("pin_point", 2, [0, 1e-4, 0]),
         ("pin4.offset_z", 1e-4): ("pin_point", 3, [0, 0, 1e-4]),
-        ("hole4.offset_t", 1e-4): ("hole_point", 3, [-1e-4, 0, 0]),
-        ("hole3.offset_e", 1e-4): ("hole_point", 2, [0, -1e-4, 0]),
-        ("hole2.offset_t", -1e-4): ("hole_point", 1, [0, 1e-4, 0]),
+        ("hole4.offset_t", 1e-4): ("hole_point", 0, [-1e-4, 0, 0]),
+        ("hole3.offset_e", 1e-4): ("hole_point", 1, [0, -1e-4, 0]),
+        ("hole2.offset_t", -1e-4): ("hole_point", 3, [0, 1e-4, 0]),
         ("pin1.tilt_z", 0.01): ("pin_axis", 0, [-s, c, 0]),
         ("pin2.tilt_z", 0.01): ("pin_axis", 1, [s, -c, 0]),
         ("pin3.tilt_t", 0.01): ("pin_axis", 2, [c, 0, -s]),
-        ("hole4.tilt_t", 0.01): ("hole_axis", 3, [0, c, -s]),
-        ("hole4.tilt_z", -0.01): ("hole_axis", 3, [s, c, 0]),
-        ("hole1.tilt_z", 0.01): ("hole_axis", 0, [c, s, 0]),
+        ("hole4.tilt_t", 0.01): ("hole_axis", 0, [0, c, -s]),
+        ("hole4.tilt_z", -0.01): ("hole_axis", 0, [s, c, 0]),
+        ("hole1.tilt_z", 0.01): ("hole_axis", 2, [c, s, 0]),
     }
-    nominal = joints.perturb(joint, operation, joints.nominal_errors(1))
+    nominal = joints.perturb(joint, operation, joints.nominal_errors(1, CARDAN))
     for (error, value), (field, index, expected) in by_hand.items():
         p = joints.perturb(joint, operation, one(**{error: value}))
         assert_allclose(p[field][0, index], expected, atol=1e-18, err_msg=error)
@@ -251,24 +275,23 @@ def test_offsets_and_tilts_by_hand(joint, operation):
 
 def test_all_features_against_finite_rotations(joint, operation):
     rng = np.random.default_rng(7)
-    errors = joints.nominal_errors(20)
+    errors = joints.nominal_errors(20, CARDAN)
     for f in ERROR_FIELDS:
         if f.name.startswith(("pin", "hole")):
             errors[f.name] = rng.normal(scale=0.3 if "tilt" in f.name else 1e-4, size=20)
     p = joints.perturb(joint, operation, errors)
-    for names, triads, kind in ((PINS, PIN_TRIADS, "pin"), (HOLES, ARM_TRIADS, "hole")):
-        for k, name in enumerate(names):
+    for k, hole in enumerate(HOLE_OF_PIN):
+        features = ((PINS[k], PIN_TRIADS[k], "pin"), (HOLES[hole - 1], ARM_TRIADS[hole - 1], "hole"))
+        for name, (e, t, z), kind in features:
             offset = np.stack([errors[f"{name}.offset_{a}"] for a in "etz"], axis=1)
-            assert_allclose(p[f"{kind}_point"][:, k], offset @ triads[k], atol=1e-18)
-            rotvec = np.outer(errors[f"{name}.tilt_t"], triads[k][1])
-            rotvec += np.outer(errors[f"{name}.tilt_z"], triads[k][2])
-            axis = Rotation.from_rotvec(rotvec).apply(triads[k][0])
-            assert_allclose(p[f"{kind}_axis"][:, k], axis, atol=1e-14)
+            assert_allclose(p[f"{kind}_point"][:, k], offset @ (e, t, z), atol=1e-18)
+            rotvec = np.outer(errors[f"{name}.tilt_t"], t) + np.outer(errors[f"{name}.tilt_z"], z)
+            assert_allclose(p[f"{kind}_axis"][:, k], Rotation.from_rotvec(rotvec).apply(e), atol=1e-14)
 
 
 def test_rows_do_not_see_each_other(joint, operation):
     rng = np.random.default_rng(8)
-    errors = joints.nominal_errors(9)
+    errors = joints.nominal_errors(9, CARDAN)
     for f in ERROR_FIELDS:
         if f.name.startswith("operation."):
             continue
@@ -315,8 +338,8 @@ def test_factor_on_E(joint, operation):
     nominal = joints.perturb(joint, operation, one())
     p = joints.perturb(joint, operation, one(material__E_factor=1.21))
     for name in PARAM.names:
-        scale = 1.21 if name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3") else 1.0
-        scale = 1.1 if name in ("c_cross", "c_fork") else scale
+        scale = 1.21 if name in ("k", "station_k1", "station_k2", "station_k3") else 1.0
+        scale = 1.1 if name == "c" else scale
         assert_allclose(p[name], scale * nominal[name], rtol=1e-14, err_msg=name)
 
 
@@ -358,7 +381,7 @@ def test_stations_without_sense_are_faults(contact, key, found):
 @pytest.mark.parametrize("n", [1, 2, 5, MAX_STATIONS])
 def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
     j = joints.load("cirelli2021", {"contact": {"law": "sliced", "n_stations": n}}, "case.toml")
-    p = joints.perturb(j, operation, joints.nominal_errors(1))[0]
+    p = joints.perturb(j, operation, joints.nominal_errors(1, CARDAN))[0]
     s, w = p["station_s"], p["station_weight"]
     assert p["n_stations"] == n
     assert_array_equal(s[n:], 0.0)
@@ -376,11 +399,11 @@ def test_each_contact_law_has_a_line_in_the_table_of_the_model(law):
 
 
 def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
-    fork = f"fork{ARM_OF_PIN[0] + 1}.F"  # of the arm in whose hole pin 1 turns
+    fork = f"fork{HOLE_OF_PIN[0]}.F"  # of the arm in whose hole pin 1 turns
     shares = {"cross1.F": 0.2, fork: 0.3, "pin1.contact": 0.1, "cross1.F at start": 0.4, "cross1.T": 0.0}
     rows = [{"load": load, "level": 700.0, "share": share} for load, share in shares.items()]
     other = {"load": "cross2.F", "level": 700.0, "share": 0.3}
-    shown = one_force([*rows, other, {**rows[0], "level": 800.0}], "level", "share")
+    shown = one_force([*rows, other, {**rows[0], "level": 800.0}], "level", "share", CARDAN)
     assert [(row["load"], row["level"], row["share"]) for row in shown] == [
         (f"cross1.F, {fork}, pin1.contact", 700.0, 0.3),
         ("cross1.F at start", 700.0, 0.4),

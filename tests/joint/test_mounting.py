@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tolstat import joint as joints
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.common.tables import Fidelity, Options
@@ -21,7 +22,7 @@ def made(**shaft: str) -> Joint:
 
 
 def parameters(joint: Joint, force: float = 300.0, error: float = 0.0) -> np.ndarray:
-    errors = joints.nominal_errors(1)
+    errors = joints.nominal_errors(1, CARDAN)
     errors["operation.axial_force"] = error
     return joints.perturb(joint, Operation.model_construct(alpha=0.1, speed=1.0, torque=1.0, axial_force=force), errors)
 
@@ -52,7 +53,7 @@ def test_a_rigid_shaft_has_the_parameters_that_it_had_without_the_keys() -> None
 
 
 def test_the_modulus_of_the_parts_does_not_change_the_bearings() -> None:
-    errors = joints.nominal_errors(1)
+    errors = joints.nominal_errors(1, CARDAN)
     errors["material.E_factor"] = 1.2
     operation = Operation.model_construct(alpha=0.1, speed=1.0, torque=1.0)
     assert joints.perturb(made(axial="2e7 N/m"), operation, errors)["k_a"][0] == 2e7

@@ -9,6 +9,7 @@ import pytest
 
 from tests.conftest import joint_with_law
 from tolstat import joint as joints
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.joint import Joint, Operation, affecting_results
@@ -100,7 +101,7 @@ def test_the_fit_has_the_least_relative_errors():
 
 def test_stations_are_slices_of_the_needles():
     joint = joint_with_law("needles")
-    errors = joints.nominal_errors(2)
+    errors = joints.nominal_errors(2, CARDAN)
     errors["material.E_factor"][1], errors["pin2.clearance"][1] = 1.1, -2e-5
     par = joints.perturb(joint, OPERATION, errors)
     sliced = joints.perturb(joint_with_law("sliced"), OPERATION, errors)
@@ -148,7 +149,7 @@ def test_needles_are_enough_of_a_bearing_and_other_laws_need_none():
     assert validate(Joint, joint.given("json"), "file.h5") == joint
     assert not joint.warnings()
     free = joints.load("cirelli2021", {"contact": {"law": "needles", "clearance": "0 mm"}, "bearing": NEEDLES}, "x")
-    assert (joints.perturb(free, OPERATION, joints.nominal_errors(1))["station_k3"][0, :5] > 0).all()
+    assert (joints.perturb(free, OPERATION, joints.nominal_errors(1, CARDAN))["station_k3"][0, :5] > 0).all()
 
 
 def test_keys_of_a_bearing_that_affect_results():

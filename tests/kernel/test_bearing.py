@@ -7,8 +7,9 @@ import pytest
 
 from tests.conftest import with_orders
 from tests.support import naive
-from tolstat.common.load_kinds import CONTACTS, RESULTANT, SPAN
-from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options
+from tests.support.of_cardan import KERNEL_RESULT, SPAN
+from tolstat.common.load_kinds import CONTACTS, RESULTANT
+from tolstat.common.tables import Fidelity, Method, Options
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
 from tolstat.kernel.revolution.settle import make_samples
 from tolstat.solver.simulation import simulate_rows

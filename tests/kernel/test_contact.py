@@ -10,25 +10,27 @@ from tests.conftest import with_law
 from tests.measure import stability
 from tests.support import naive
 from tests.support.environment import ROOT
+from tests.support.mechanisms import N_DOF, N_LUMPS, S, body
+from tests.support.of_cardan import RESULT, SPAN
 from tolstat import joint as joints
-from tolstat.common.load_kinds import RESULTANT, SPAN
-from tolstat.common.tables import RESULT, Mode, Options, iterations_allowed
+from tolstat.common.load_kinds import RESULTANT
+from tolstat.common.tables import Mode, Options, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics, rotation
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN, S
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
 from tolstat.kernel.revolution import closeup
 from tolstat.solver import simulation
 
 STUDY = ROOT / "studies" / "rigid_shafts.toml"
-PINS = slice(6 * PIN, 6 * PIN + 24)
-DAMPING = ("c_cross", "c_fork", "c_d", "c_t")
+PIN = 6 * body("pin1")
+PINS = slice(PIN, PIN + 24)
+DAMPING = ("c", "c_d", "c_t")
 
 
 def contacts_alone(params, random_errors, law):
     """A straight joint with errors, pins pressed some 10 um into their holes; no bushing, film or damping acts."""
     par = with_law(params(**random_errors(1)), law)[0]
-    for name in ("k_cross", "k_fork", *DAMPING):
+    for name in ("k", *DAMPING):
         par[name] = 0.0
     par.clearance[:] = 1e-5
     rng = np.random.default_rng(3)
@@ -55,12 +57,12 @@ def potential(par, q, work):
 def generalised(q, work):
     """Forces on the unknowns of the lumps, N and N m."""
     force = work.force[:N_LUMPS].copy()
-    for body in range(N_LUMPS):
-        phi = tuple(q[6 * body + 3 : 6 * body + 6])
+    for lump in range(N_LUMPS):
+        phi = tuple(q[6 * lump + 3 : 6 * lump + 6])
         turns = np.array(
             [rotation.spin(phi, rotation.coefficients(np.dot(phi, phi)), tuple(axis)) for axis in np.eye(3)]
         )
-        force[body, 3:] = turns @ force[body, 3:]
+        force[lump, 3:] = turns @ force[lump, 3:]
     return force.ravel()
 
 
@@ -148,14 +150,14 @@ def test_one_end_alone_touches_with_the_point_law_and_both_with_the_uniform_one(
     par, work = params()[0], make_work()
     contact = joints.load("cirelli2021", {}, "test", None).contact
     depth, q = 4e-6, np.zeros(N_DOF)
-    q[6 * PIN + 2] = par.clearance[0] + depth  # pin 1 along z
+    q[PIN + 2] = par.clearance[0] + depth  # pin 1 along z
     pressed = stations_of(par, q, np.zeros(N_DOF), work)
     uniform = contact.k1u * depth**2 + contact.k2u * depth
     assert work.contact[0, RESULTANT] == pytest.approx(uniform, rel=1e-6)
     assert pressed[0, :, FORCE].sum() == pytest.approx(uniform, rel=1e-6)
     assert work.mode[0] == 3
     tilt = 1e-3
-    q[6 * PIN + 2], q[6 * PIN + 3] = par.clearance[0] + depth - 0.011 * tilt, tilt
+    q[PIN + 2], q[PIN + 3] = par.clearance[0] + depth - 0.011 * tilt, tilt
     stations_of(par, q, np.zeros(N_DOF), work)
     point = contact.k1p * depth**2 + contact.k2p * depth
     np.testing.assert_allclose(work.contact[0], [point, 0.0, point], rtol=2e-2)
@@ -175,7 +177,7 @@ def test_each_end_of_a_tilted_pin_presses_with_its_own_penetration(params, outer
     contact = joints.load("cirelli2021", {}, "test", None).contact
     up, down, length = par.clearance[0] + outer, par.clearance[0] + inner, 0.022
     q = np.zeros(N_DOF)
-    q[6 * PIN + 2], q[6 * PIN + 3] = 0.5 * (up - down), (up + down) / length  # shift along z, tilt of the pin along y
+    q[PIN + 2], q[PIN + 3] = 0.5 * (up - down), (up + down) / length  # shift along z, tilt of the pin along y
     stations_of(par, q, np.zeros(N_DOF), work)
     of_outer, of_inner = (contact.k1p * max(d, 0.0) ** 2 + contact.k2p * max(d, 0.0) for d in (outer, inner))
     np.testing.assert_allclose(work.contact[0], [of_outer, of_inner, abs(of_outer - of_inner)], rtol=5e-3)

@@ -6,28 +6,14 @@ import numpy as np
 import pytest
 
 from tests.conftest import sliding, with_law
+from tests.support.mechanisms import N_DOF, N_LUMPS, PSI, S, body, bushing_kind, lump_kind, triads
 from tests.support.stepping import make_state
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Options
 from tolstat.kernel.integrators.stability import depth_at, eigenvalue, fewest_steps, largest_force
 from tolstat.kernel.integrators.verlet import correct, predict
-from tolstat.kernel.mechanics.topology import (
-    ARM,
-    ARM_OF_PIN,
-    BUSHING_BASE,
-    BUSHING_LUMP,
-    FRAME,
-    FRAME_I,
-    HUB,
-    N_DOF,
-    N_LUMPS,
-    OUTPUT_SHAFT,
-    PIN,
-    PSI,
-    TRIAD,
-    S,
-)
 from tolstat.kernel.mechanics.work import make_work
-from tolstat.kernel.revolution.peaks import PEAKS, follow_value, forget
+from tolstat.kernel.revolution.peaks import follow_value, forget, peaks_dtype
 
 
 def oscillator(steps: int, stiffness: float, damping: float, end: float = 1.0) -> float:
@@ -83,30 +69,31 @@ def dense(h: float, depth: float, par: np.record) -> np.ndarray:
         row[6 * one : 6 * one + 6] = on_one
         if other < N_LUMPS:
             row[6 * other : 6 * other + 6] -= on_other
-        elif other == OUTPUT_SHAFT:
+        elif other == body("output"):
             row[PSI], row[S] = -on_other[5], -par.slides * on_other[2]
         found[:] += (h * h / 4 * k + h * c) * np.outer(row, row)
 
-    for lump, base in zip(BUSHING_LUMP, BUSHING_BASE, strict=True):
-        e, z = TRIAD[lump][0], np.array([0, 0, -par.l_f if FRAME[lump] == FRAME_I else par.l_f])
-        k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
-        on_lump, on_base = ((par.r_b - par.R) * e, par.r_b * e) if base == HUB else (z, par.R * e + z)
-        for i, axis in enumerate(TRIAD[lump]):
+    for bushing in CARDAN.bushings:
+        lump, base, kind = body(bushing.lump), body(bushing.base), bushing_kind(bushing.kind)
+        on_lump, on_base = par.marker[kind] @ triads()[lump]
+        k, c = par.k[kind], par.c[kind]
+        for i, axis in enumerate(triads()[lump]):
             forces = np.r_[axis, np.cross(on_lump, axis)], np.r_[axis, np.cross(on_base, axis)]
             torques = np.r_[0 * axis, axis], np.r_[0 * axis, axis]
             add(lump, base, *forces, k[i], c[i])
             add(lump, base, *torques, k[3 + i], c[3 + i])
-    for pin in range(4):
+    for pin, pair in enumerate(CARDAN.pairs):
+        e, *across = triads()[body(pair.pin)]
         for j in range(par.n_stations):
             slope, c = slope_of(par, pin, j, depth), par.c_d * par.station_weight[j]
-            for axis in TRIAD[PIN + pin][1:]:
-                along = np.r_[axis, np.cross(par.station_s[j] * TRIAD[PIN + pin][0], axis)]
-                add(PIN + pin, ARM + ARM_OF_PIN[pin], along, along, slope, c)
-    for body in range(N_LUMPS):
-        name = "hub" if body == HUB else "pin" if body < ARM else "arm"
-        mass[6 * body : 6 * body + 3] = par[f"{name}_mass"]
-        mass[6 * body + 3 : 6 * body + 6] = np.abs(TRIAD[body].T @ par[f"{name}_inertia"])
-    mass[PSI], mass[S] = par.Js, par.m_s if par.slides else 1.0
+            for axis in across:
+                along = np.r_[axis, np.cross(par.station_s[j] * e, axis)]
+                add(body(pair.pin), body(pair.hole), along, along, slope, c)
+    for i, lump in enumerate(CARDAN.lumps):
+        kind = lump_kind(lump.kind)
+        mass[6 * i : 6 * i + 3] = par.mass[kind]
+        mass[6 * i + 3 : 6 * i + 6] = np.abs(triads()[i].T @ par.inertia[kind])
+    mass[PSI], mass[S] = par.Js[0], par.m_s if par.slides else 1.0
     found[S, S] += h * h / 4 * par.k_a + h * par.c_a
     return found / np.sqrt(np.outer(mass, mass))
 
@@ -142,16 +129,16 @@ def test_steps_are_stable_and_not_many_more_than_needed(params, random_errors, l
     assert largest_force(2 * steps, par, work) > force
 
 
-def test_peaks_between_steps_are_met() -> None:
-    peaks = np.zeros(1, PEAKS).view(np.recarray)[0]
+def test_peaks_between_steps_are_met(params) -> None:
+    peaks, par = np.zeros(1, peaks_dtype(CARDAN)).view(np.recarray)[0], params()[0]
     forget(True, peaks)
     curve = 3 + np.sin(0.3 * np.arange(25) + 0.2)
     for value in curve:
-        follow_value(2, value, peaks)
+        follow_value(2, value, par, peaks)
     assert curve.max() < 4 - 1e-3
     assert peaks.top[2] == pytest.approx(4, abs=2e-4)
     assert (peaks.last[2], peaks.before[2]) == (curve[-1], curve[-2])
     forget(True, peaks)
     for value in (5.0, 4.0, 3.0):
-        follow_value(2, value, peaks)
+        follow_value(2, value, par, peaks)
     assert peaks.top[2] == 5.0

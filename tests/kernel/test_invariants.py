@@ -12,15 +12,17 @@ from tests.conftest import sliding, with_law
 from tests.kernel.test_dynamics import OPTIONS, ORDERS, SHAFTS, loaded
 from tests.support import energy, naive
 from tests.support.kernel_energy import ENERGY, ENERGY_FIELDS
-from tolstat.common.tables import PARAM, Method, Options, Status
+from tests.support.mechanisms import N_DOF, PSI, body, lump_kind, triads
+from tests.support.of_cardan import PARAM
+from tolstat.common.cardan import CARDAN
+from tolstat.common.tables import Method, Options, Status
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics
-from tolstat.kernel.mechanics.topology import ARM, FRAME, HUB, N_BODIES, N_DOF, PIN, PSI
 from tolstat.kernel.mechanics.work import make_work
 
 METHODS = pytest.mark.parametrize("method", list(Method))
 BENT = np.radians(15)
-DAMPERS = ("c_cross", "c_fork", "c_d", "c_t", "c_a")
+DAMPERS = ("c", "c_d", "c_t", "c_a")
 
 
 def integrated(par, revolutions, **options):
@@ -43,20 +45,12 @@ def particles(t, q, par):
 
     A pair on each principal axis, at the distance that gives the lump's second moments of mass.
     """
-    body = naive.Bodies(t, q, par)
-    places, masses = [], []
-    for name in list(body.position)[:9]:
-        kind, number = name[:3], name[3:]
-        mass, inertia = {
-            "hub": (par.hub_mass, par.hub_inertia),
-            "pin": (par.pin_mass, par.pin_inertia),
-            "arm": (par.arm_mass, par.arm_inertia),
-        }[kind]
-        axes = {"pin": naive.PIN_AXES, "arm": naive.ARM_AXES}.get(kind, {})
-        local = naive.triad(axes[int(number)]) if number else np.eye(3)
+    at, (places, masses) = naive.bodies(t, q, par), ([], [])
+    for i, lump in enumerate(CARDAN.lumps):
+        mass, inertia = par.mass[lump_kind(lump.kind)], par.inertia[lump_kind(lump.kind)]
         distance = np.sqrt(3 * (0.5 * inertia.sum() - inertia) / mass)
-        arms = distance[:, None] * (local @ body.attitude[name].T)
-        places.append(body.position[name] + np.concatenate([arms, -arms]))
+        arms = distance[:, None] * (triads()[i] @ at.attitude[i].T)
+        places.append(at.position[i] + np.concatenate([arms, -arms]))
         masses.append(np.full(6, mass / 6))
     return np.concatenate(places), np.concatenate(masses)
 
@@ -80,7 +74,8 @@ def test_kinetic_energy_is_that_of_particles(params, random_errors):
     velocity = (places[0] - 8 * places[1] + 8 * places[3] - places[4]) / 12e-5
     work = make_work()
     dynamics.forces(t, q, v, par, work)
-    expected = 0.5 * masses @ (velocity**2).sum(axis=1) + 0.5 * par.Js * (work.shaft[0] + v[PSI]) ** 2
+    output = work.frame_w[par.frame[body("output")], 2] + v[PSI]
+    expected = 0.5 * masses @ (velocity**2).sum(axis=1) + 0.5 * par.Js[0] * output**2
     kinetic = measured(par, t, q, v)["kinetic"]
     assert kinetic == pytest.approx(expected, rel=1e-9)
     assert measured(par, t, q, 1.001 * v)["kinetic"] != pytest.approx(expected, rel=1e-9)
@@ -193,7 +188,7 @@ def ground_loads(t, q, v, par):
     """Force on every body and its moment about O, in ground axes; shape (11, 2, 3)."""
     work = make_work()
     dynamics.forces(t, q, v, par, work)
-    frames = np.array(naive.frames(par.omega * t, par.alpha))[FRAME]
+    frames = naive.ideal_attitudes(t, par, CARDAN)
     force = np.einsum("bij,bj->bi", frames, work.force[:, :3])
     torque = np.einsum("bij,bj->bi", frames, work.force[:, 3:] + np.cross(work.pos, work.force[:, :3]))
     return np.stack([force, torque], axis=1)
@@ -205,7 +200,7 @@ def test_action_is_reaction_at_each_step(revolution):
         loads = ground_loads(t, q, v, par)
         size = np.abs(loads).max(axis=(0, 2))
         assert (np.abs(loads.sum(axis=0)).max(axis=1) < 1e-12 * size).all()
-        loads[PIN] *= 1 + 1e-6
+        loads[body("pin1")] *= 1 + 1e-6
         assert (np.abs(loads.sum(axis=0)).max(axis=1) > 1e-12 * size).all()
 
 
@@ -213,17 +208,18 @@ def test_action_is_reaction_at_each_step(revolution):
 def test_momentum_of_the_cross_changes_by_the_forces_of_the_arms_at_each_step(revolution):
     """Linear and angular, about O, in ground axes; rates from second differences of the particles' positions."""
     par, points = revolution
-    assert HUB < PIN < ARM == 5
+    arms = body("hole1")
+    assert {lump.member for lump in CARDAN.lumps[:arms]} == {"cross"}
     rates, loads = [], []
     h = 1e-4
     for t, q, v, a in points:
         places, masses = along(t, q, v, a, par, h)
-        cross = slice(0, 6 * ARM)
+        cross = slice(0, 6 * arms)
         acceleration = np.tensordot([-1, 16, -30, 16, -1], places, 1)[cross] / (12 * h * h)
         force = masses[cross, None] * acceleration
         rates.append([force.sum(axis=0), np.cross(places[2, cross], force).sum(axis=0)])
         # what the arms and shafts do not keep for themselves acts on the cross
-        loads.append(-ground_loads(t, q, v, par)[ARM:N_BODIES].sum(axis=0))
+        loads.append(-ground_loads(t, q, v, par)[arms:].sum(axis=0))
     rates, loads = np.array(rates), np.array(loads)
     size = np.abs(rates).max(axis=(0, 2))
     assert (size > [0.05, 0.5]).all(), "N, N m"
@@ -238,7 +234,7 @@ def test_a_joint_that_fails_keeps_what_it_reached(params):
     assert outside.status == Status.OUTSIDE_MODEL
     assert outside.points.shape == (0, 3, N_DOF)
     par = params(alpha=BENT)
-    par.hub_mass[0] = np.nan
+    par.mass[0, lump_kind("hub")] = np.nan
     failed = energy.follow(par, OPTIONS, 10)
     assert failed.status == Status.NEWTON_FAILED
     assert len(failed.t) == len(failed.points) == 1

@@ -9,9 +9,10 @@ import pytest
 
 from tests.conftest import REFERENCE, joint_with_law, sliding
 from tests.support import kernel_states, trajectory
+from tests.support.of_cardan import PARAM, RESULT
 from tolstat import joint as joints
 from tolstat import sampling, study
-from tolstat.common.tables import PARAM, Fidelity, Method, Options, Start, Status, iterations_allowed
+from tolstat.common.tables import Fidelity, Method, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
@@ -154,7 +155,7 @@ def assert_same(a, b):
 
 
 def alone(params, options, monkeypatch):
-    results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
+    results = np.zeros(len(params), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
     monkeypatch.setattr(simulation, "MOST_ALONE", len(params))
     samples = {i: own.copy() for i, own in simulation.simulate_together(params, options, left, True, results)}
@@ -195,7 +196,7 @@ def test_lanes_take_the_steps_of_a_plain_driver(mixed, method, start):
     """States at every point of the second revolution, m and rad, beside those of `stepping`; two joints may whirl."""
     options = Options(method=int(method), start=int(start), max_revs=2, settle_tol=1e-12, newton_tol=1e-9)
     rows = [params for params in np.split(mixed, len(mixed)) if params["clearance"].min() > 0][:6]
-    results = np.zeros(len(rows), simulation.RESULT).view(np.recarray)
+    results = np.zeros(len(rows), RESULT).view(np.recarray)
     left, n, apart = np.full(len(rows), 10**6), options.steps_per_rev, np.full(len(rows), np.inf)
     for i, samples in simulation.simulate_together(np.concatenate(rows), options, left, True, results):
         points, _ = trajectory.follow(rows[i], options, 2 * n)

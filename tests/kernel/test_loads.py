@@ -6,17 +6,34 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic
-from tolstat.common.channels import CHANNELS
-from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.load_kinds import KIND, LOAD_KINDS, SPAN, measure_of
-from tolstat.common.loads import LOADS, largest, of_kind, put_largest
-from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
-from tolstat.kernel.mechanics import dynamics, ideal_loads, loads
-from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_INSTANT, N_LOADS, OF_MEASURE, OTHERS
-from tolstat.kernel.mechanics.topology import N_DOF
+from tests.support.mechanisms import N_DOF
+from tests.support.of_cardan import (
+    CHANNELS,
+    KERNEL_RESULT,
+    KIND,
+    LOAD_KINDS,
+    LOADS,
+    RESULT,
+    RESULT_COLUMNS,
+    RESULT_FIELDS,
+    SPAN,
+    for_kernels,
+    largest,
+    put_largest,
+    without_results,
+)
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import load_numbers, measure_of, sizes
+from tolstat.common.loads import of_kind
+from tolstat.common.mechanism import numbering
+from tolstat.common.tables import Options, Status
+from tolstat.kernel.cardan import ideal_loads
+from tolstat.kernel.mechanics import dynamics, loads
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution import settle
 from tolstat.solver.simulation import simulate_rows
+
+SIZES, CARDAN_NUMBERS = sizes(CARDAN), numbering(CARDAN)
 
 
 def test_kernels_see_the_same_bytes() -> None:
@@ -24,8 +41,8 @@ def test_kernels_see_the_same_bytes() -> None:
     assert RESULT.itemsize == KERNEL_RESULT.itemsize
     table = np.zeros(3, RESULT)
     rows = for_kernels(table)
-    rows.largest[:] = np.arange(3 * N_LOADS).reshape(3, N_LOADS)
-    rows.average[:], rows.range[:], rows.step_error[:] = rows.largest[:, :N_AVERAGED], -1.0, 7.0
+    rows.largest[:] = np.arange(3 * SIZES.loads).reshape(3, SIZES.loads)
+    rows.average[:], rows.range[:], rows.step_error[:] = rows.largest[:, : SIZES.averaged], -1.0, 7.0
     np.testing.assert_array_equal(largest(table), rows.largest)
     for kind in LOAD_KINDS:
         expected = rows.largest[:, SPAN[kind.key]].reshape(3, *kind.shape)
@@ -45,9 +62,9 @@ def test_the_range_of_a_modulus_that_falls_to_zero_is_not_above_its_largest_valu
     load = 700.0 * np.maximum(np.cos(2 * np.pi * (np.arange(36) + 0.2) / 36), 1e-4)
     samples.loads[:] = load[:, None]
     settle.summarise(params(alpha=0.26)[0], samples, out[0])
-    np.testing.assert_allclose(out.largest[0, :N_AVERAGED], 700.0, rtol=1e-3)
+    np.testing.assert_allclose(out.largest[0, : SIZES.averaged], 700.0, rtol=1e-3)
     np.testing.assert_allclose(out.range[0], 700.0, rtol=1e-3)
-    assert (out.range[0] <= out.largest[0, :N_AVERAGED]).all()
+    assert (out.range[0] <= out.largest[0, : SIZES.averaged]).all()
     np.testing.assert_allclose(out.average[0], load.mean())
 
 
@@ -82,12 +99,14 @@ def test_a_name_is_place_and_symbol() -> None:
 def test_loads_that_decide_are_compared_with_their_measure() -> None:
     """Indices of the kernel against the registry: each deciding load once, beside the loads of its measure."""
     of_load = np.repeat([kind.key for kind in LOAD_KINDS], [kind.size for kind in LOAD_KINDS])
-    assert sorted([*DECIDING, *OTHERS]) == list(range(N_INSTANT))
-    for (first, last), (begin, end) in zip(MEASURES, OF_MEASURE, strict=True):
+    numbers = load_numbers(CARDAN)
+    deciding = numbers["deciding"]
+    assert sorted([*deciding, *numbers["others"]]) == list(range(SIZES.instant))
+    for (first, last), (begin, end) in zip(numbers["measured"], numbers["of_measure"], strict=True):
         (measure,) = set(of_load[first:last])
-        assert {measure_of(KIND[key]).key for key in of_load[DECIDING[begin:end]]} == {measure}
-        assert DECIDING[begin : begin + last - first].tolist() == list(range(first, last))
-    assert {of_load[i] for i in DECIDING} == {kind.key for kind in LOAD_KINDS if kind.decides}
+        assert {measure_of(KIND[key]).key for key in of_load[deciding[begin:end]]} == {measure}
+        assert deciding[begin : begin + last - first].tolist() == list(range(first, last))
+    assert {of_load[i] for i in deciding} == {kind.key for kind in LOAD_KINDS if kind.decides}
 
 
 def written(evaluate) -> dict[str, np.ndarray]:
@@ -103,9 +122,11 @@ def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> Non
     at_rest = np.zeros(N_DOF)
     dynamic = written(lambda work: dynamics.forces(0.01, at_rest, at_rest, par, work))
     ideal = written(lambda work: ideal_loads.ideal_loads(0.5, at_rest, par, work))
-    for name in ("load", "contact", "mode", "force", "shaft", "turned", "pos", "vel"):
-        assert dynamic[name].all(), name
-        assert ideal[name].all(), name
+    turning = CARDAN_NUMBERS["about_z"] == 1
+    for name in ("load", "contact", "mode", "force", "frame_w", "turned", "pos", "vel"):
+        these = turning if name == "turned" else slice(None)
+        assert dynamic[name][these].all(), name
+        assert ideal[name][these].all(), name
     work = make_work()
     ideal_loads.ideal_loads(0.5, at_rest, par, work)
     loads.write_loads(at_rest, par, work)

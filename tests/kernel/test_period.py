@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.common.tables import KERNEL_RESULT, Options, Status
-from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_DECIDING, OF_FORCES
+from tests.support.of_cardan import KERNEL_RESULT
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import load_numbers
+from tolstat.common.tables import Options, Status
+from tolstat.kernel.mechanics.loads import OF_FORCES
 from tolstat.kernel.revolution.outcome import check_settled
 from tolstat.kernel.revolution.settle import ALL_LOADS, make_samples
 from tolstat.kernel.revolution.trail import (
@@ -105,21 +108,21 @@ def test_trend_is_the_line_through_the_logarithms():
     assert np.isnan(closure_trend(20.0, trail.notes)).all()
 
 
-def test_closure_over_several_revolutions_finds_the_period():
-    trail = make_trail(36, 10)
+def test_closure_over_several_revolutions_finds_the_period(params):
+    trail, par, numbers = make_trail(36, 10), params()[0], load_numbers(CARDAN)
     rng = np.random.default_rng(2)
-    three = rng.uniform(1, 2, (3, 36, N_DECIDING))
+    three = rng.uniform(1, 2, (3, 36, len(numbers["deciding"])))
     for r in range(20):
         trail.loads[r % 10] = three[r % 3]
-    closures = [lag_closure(19, lag, trail) for lag in range(1, 9)]
+    closures = [lag_closure(19, lag, par, trail) for lag in range(1, 9)]
     assert [c == 0 for c in closures] == [False, False, True, False, False, True, False, False]
     change = []
-    for least, most in MEASURES:
-        own = np.isin(DECIDING, np.arange(least, most))
+    for least, most in numbers["measured"]:
+        own = np.isin(numbers["deciding"], np.arange(least, most))
         change.append(np.abs(three[1] - three[0])[:, own].max() / three[1][:, own].max())
     assert closures[0] == pytest.approx(max(change))
     trail.loads[19 % 10, 5, 3] = np.nan
-    assert np.isnan(lag_closure(19, 3, trail))
+    assert np.isnan(lag_closure(19, 3, par, trail))
 
 
 def test_combined_statistics_are_those_of_all_revolutions():

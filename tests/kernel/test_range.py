@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tests.support.of_cardan import HOLES, PINS
 from tolstat import joint as joints
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES, MAX_SHIFT, MAX_TILT
+from tolstat.common.tables import MAX_SHIFT, MAX_TILT
 from tolstat.joint import Operation
 from tolstat.kernel.revolution.outcome import inside_model
 

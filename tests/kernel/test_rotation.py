@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support import mechanisms
+from tests.support.of_cardan import blank_params
 from tolstat.kernel.mechanics import rotation
-from tolstat.kernel.mechanics.topology import TRIAD
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
 
@@ -96,7 +97,7 @@ def test_sine_and_cosine_are_those_of_the_library(size):
 
 
 def test_triads_are_quarter_turns():
-    vector = (1.0, 2.0, 3.0)
-    for body, triad in enumerate(TRIAD):
-        np.testing.assert_array_equal(to_triad(body, vector), triad @ vector)
-        np.testing.assert_array_equal(from_triad(body, vector), triad.T @ vector)
+    vector, par = (1.0, 2.0, 3.0), blank_params(1).view(np.recarray)[0]
+    for body, triad in enumerate(mechanisms.triads()):
+        np.testing.assert_array_equal(to_triad(body, vector, par), triad @ vector)
+        np.testing.assert_array_equal(from_triad(body, vector, par), triad.T @ vector)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tests.support import naive
-from tolstat.common.channels import CHANNELS, COMPONENTS, SHAFT_LOADS
-from tolstat.common.load_kinds import ORDERS, SPAN
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import RESULT, Options, Status, for_kernels
+from tests.support.mechanisms import N_DOF, S, body
+from tests.support.of_cardan import CHANNELS, COMPONENTS, LOADS, RESULT, SHAFT_LOADS, SPAN, for_kernels
+from tolstat.common.load_kinds import ORDERS
+from tolstat.common.tables import Options, Status
 from tolstat.kernel.mechanics import dynamics, loads
-from tolstat.kernel.mechanics.topology import INPUT_SHAFT
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.settle import make_samples
@@ -87,7 +86,7 @@ def test_orders_of_the_ideal_joint_are_those_of_its_closed_form(params, fidelity
         assert of(f"{name}_1x", found) < 1e-4 * TORQUE
 
 
-def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude() -> None:
+def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude(params) -> None:
     """At order 2 both ways round and to and fro, beside a constant force and other orders."""
     theta = 2 * np.pi * np.arange(90) / 90
     turning = 22 * np.exp(2j * theta) + 500 + 3 * np.exp(1j * theta)
@@ -96,7 +95,7 @@ def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude() -> Non
         samples.shafts[:], samples.psi[:] = 0.0, 1e-3 * np.cos(3 * theta - 1)
         samples.shafts[:, 1, 0], samples.shafts[:, 1, 1] = curve.real, curve.imag
         samples.shafts[:, 0, 5] = 100 + 7 * np.sin(4 * theta)
-        write_orders(samples, result)
+        write_orders(params()[0], samples, result)
         largest = {key: result.largest[span] for key, span in SPAN.items()}
         assert largest["lateral_orders"] == pytest.approx([0, 0, 0, 0, 3, 22, 0, 0], abs=1e-10)
         assert largest["drive_orders"] == pytest.approx([0, 0, 0, 7], abs=1e-10)
@@ -112,25 +111,25 @@ def test_shafts_carry_what_the_naive_twin_says(params, random_errors, speed: flo
     for name, value in SLIDING.items() if slides else ():
         par[name] = value
     rng = np.random.default_rng(8)
-    q, v, t = 1e-4 * rng.normal(size=56), 1e-2 * rng.normal(size=56), 0.019
-    q[55] = 3e-4
+    q, v, t = 1e-4 * rng.normal(size=N_DOF), 1e-2 * rng.normal(size=N_DOF), 0.019
+    q[S] = 3e-4
     work = make_work()
     dynamics.forces(t, q, v, par, work)
     loads.write_loads(v, par, work)
     loads.complete_loads(par, work)
-    force, bodies = naive.forces(t, q, v, par)[0], naive.Bodies(t, q, par)
-    output = naive.turn((0, 1, 0), par.alpha)
-    for shaft, (name, axes) in enumerate((("in", np.eye(3)), ("out", output))):
-        f, about = force[name][:3], bodies.position[name]
-        m = force[name][3:] + np.cross(about, f)
+    force, places = naive.forces(t, q, v, par).force, naive.bodies(t, q, par).position
+    output = naive.turn((0, 1, 0), par.alpha[0])
+    for shaft, (name, axes) in enumerate((("input", np.eye(3)), ("output", output))):
+        f, about = force[body(name), :3], places[body(name)]
+        m = force[body(name), 3:] + np.cross(about, f)
         f, m = axes.T @ f, axes.T @ m
-        if name == "out" and slides:
-            f[2] = par.k_a * q[55] + par.c_a * v[55] - par.F_a
+        if name == "output" and slides:
+            f[2] = par.k_a * q[S] + par.c_a * v[S] - par.F_a
         np.testing.assert_allclose(work.shafts[shaft], [*f, *m], rtol=1e-6, atol=1e-5 * np.abs(f).max())
-        assert work.loads[loads.LATERAL + shaft] == pytest.approx(np.hypot(*f[:2]), rel=1e-5)
-        assert work.loads[loads.MOMENT + shaft] == pytest.approx(np.hypot(*m[:2]), rel=1e-4)
-        assert work.loads[loads.AXIAL + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
-    assert work.pos[INPUT_SHAFT, 2] == 0
+        assert work.loads[par.begin[loads.LATERAL] + shaft] == pytest.approx(np.hypot(*f[:2]), rel=1e-5)
+        assert work.loads[par.begin[loads.MOMENT] + shaft] == pytest.approx(np.hypot(*m[:2]), rel=1e-4)
+        assert work.loads[par.begin[loads.AXIAL] + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
+    assert work.pos[body("input"), 2] == 0
 
 
 @pytest.mark.parametrize(("speed", "fidelity"), [(500 * RPM, 0), (-500 * RPM, 0), (500 * RPM, 1)])

@@ -18,13 +18,14 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from studies.precision.measuring import in_turn
 from tests.measure.operations import count_apart
 from tests.support.kernel_states import UNLIMITED, Sample, Snapshot, dense, into_lanes, snapshots, tally
+from tests.support.mechanisms import N_DOF
+from tests.support.of_cardan import RESULT
 from tests.support.stepping import make_state
-from tolstat.common.tables import RESULT, Options
+from tolstat.common.tables import Options
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.lockstep import START_ONLY
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.contact import contact_load
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, fma
@@ -48,22 +49,22 @@ def repeat(part, times, t, cv, ca, motion, par, options, work):
     """Execute a part `times` times at the state ``motion.q``, ``v``, ``a`` of time `t`; cv, ca as from `predict`."""
     residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
     assemble(cv, ca, cv, par, work)
-    eliminate(work)
+    eliminate(par, work)
     for _ in range(times):
         if part == RESIDUAL:
             residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
         elif part == CONTACT:
-            for pin in range(4):
+            for pin in range(par.pin.shape[0]):
                 contact_load(pin, par, work)
         elif part == ASSEMBLY:
             assemble(cv, ca, cv, par, work)
         elif part == ELIMINATION:
             assemble(cv, ca, cv, par, work)
-            eliminate(work)
+            eliminate(par, work)
         else:
             for i in range(N_DOF):
                 work.solution[i] = -motion.residual[i]
-            solve(motion.q, work)
+            solve(motion.q, par, work)
 
 
 @njit

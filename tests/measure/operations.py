@@ -101,30 +101,29 @@ def count(snapshot: Snapshot) -> dict[str, int]:
     dict of str to int
         ``contact``, ``residual`` (with contacts), ``assembly``, ``elimination``, ``substitution``.
     """
+    from tolstat.common.cardan import CARDAN
     from tolstat.common.tables import Options
+    from tolstat.kernel.mechanics import cardan as of_joint
     from tolstat.kernel.mechanics import contact as contacts
     from tolstat.kernel.mechanics import dynamics, linsolve, rotation, tangent
     from tolstat.kernel.mechanics import motion as motions
-    from tolstat.kernel.mechanics.work import FIELDS
+    from tolstat.kernel.mechanics.work import work_fields
 
-    for module in (contacts, dynamics, motions, rotation):
+    for module in (of_joint, contacts, dynamics, motions, rotation):
         vars(module)["math"] = _counting_math()
     row = snapshot.params[0]
     par = SimpleNamespace(
-        **{
-            name: _counting(row[name]) if row.dtype[name].base.kind == "f" else int(row[name])
-            for name in row.dtype.names
-        }
+        **{name: _counting(row[name]) if row.dtype[name].base.kind == "f" else row[name] for name in row.dtype.names}
     )
-    work = SimpleNamespace(**{name: _counting(np.zeros(shape)) for name, shape in FIELDS.items()})
+    work = SimpleNamespace(**{name: _counting(np.zeros(shape)) for name, shape in work_fields(CARDAN).items()})
     t, cv, ca = Counting(snapshot.t), Counting(snapshot.cv), Counting(snapshot.ca)
     q, v, a, out = (_counting(x) for x in (snapshot.q, snapshot.v, snapshot.a, np.zeros(snapshot.q.size)))
     parts: dict[str, Callable[[], Any]] = {
         "residual": lambda: dynamics.residual(t, q, v, a, par, Options(), work, out),
-        "contact": lambda: [contacts.contact_load(pin, par, work) for pin in range(4)],
+        "contact": lambda: [contacts.contact_load(pin, par, work) for pin in range(par.pin.size)],
         "assembly": lambda: tangent.assemble(cv, ca, cv, par, work),
-        "elimination": lambda: linsolve.factorise(work),
-        "substitution": lambda: linsolve.solve(q, work),
+        "elimination": lambda: linsolve.factorise(par, work),
+        "substitution": lambda: linsolve.solve(q, par, work),
     }
     counts = {}
     for name, part in parts.items():

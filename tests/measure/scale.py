@@ -19,10 +19,11 @@ import numpy as np
 import pytest
 
 from tests.support import fakes, synthetic
+from tests.support.of_cardan import RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
-from tolstat.common.tables import RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store import ResultFile
 
 

@@ -17,13 +17,14 @@ import numpy as np
 
 from tests.conftest import joint_with_law
 from tests.support import trajectory
+from tests.support.mechanisms import N_DOF, N_LUMPS, S
+from tests.support.of_cardan import RESULT
 from tests.support.stepping import CV_FACTORISED, H_OLD, advance, make_state, reset
 from tolstat import joint, sampling, study
-from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
+from tolstat.common.tables import SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import LAWS
 from tolstat.kernel.integrators import first_order
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
-from tolstat.kernel.mechanics.work import WORK, make_work
+from tolstat.kernel.mechanics.work import make_work, work_dtype
 from tolstat.kernel.revolution.settle import grid_step
 from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.solver import simulation
@@ -74,7 +75,7 @@ def rows_of(path: Path, n: int, law: str, torque: float | None) -> Table:
 def growths(params: Table, options: Options) -> list[Growth | None]:
     """Eigenvalues along the last revolution of each joint; None of those without results."""
     found: list[Growth | None] = []
-    works, column = np.zeros(1, WORK), np.empty((3, 2 * N_DOF))
+    works, column = np.zeros(1, work_dtype()), np.empty((3, 2 * N_DOF))
     matrices = np.empty((ANGLES, 2 * N_DOF, 2 * N_DOF))
     results = np.zeros(len(params), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))

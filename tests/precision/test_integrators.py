@@ -11,8 +11,8 @@ from studies.precision import integrators
 from studies.precision.integrators import Integrator, both_ways
 from studies.precision.runs import OtherJob, OwnJob, largest_of
 from tests.support.loads import largest_loads
-from tolstat.common.load_kinds import SPAN
-from tolstat.common.tables import RESULT, Options, Status
+from tests.support.of_cardan import RESULT, SPAN
+from tolstat.common.tables import Options, Status
 from tolstat.solver.reference import FirstOrder, first_order
 
 EVERY = both_ways(("Radau", "BDF", "LSODA", "CVODE", "Exudyn"))

@@ -16,6 +16,7 @@ from tests.support.two_errors import stand_in
 from tolstat import study
 from tolstat.campaign import blocks
 from tolstat.campaign.work import Work
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.display.answer import Listing
 from tolstat.questions import allocate as question
@@ -34,7 +35,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Campaign with a finished search; not to be written."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blocks, "simulate_rows", stand_in)
-        patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+        patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
         path = made(tmp_path_factory.mktemp("allocate"), WHOLE)
         simulated(path)
     return path
@@ -199,15 +200,15 @@ def test_faults_of_targets_costs_and_names_are_told_together(done: Path, tmp_pat
 def test_cost_is_of_a_feature_and_a_reciprocal_power(tmp_path: Path) -> None:
     plan = study.load(Path("made.toml"), text=TEXT.replace('"pin*.tilt_t"', '"pin*.tilt_[tz]"'))
     tilt, offset = scaling.tolerances(plan)
-    assert costs.of([tilt])[0].at(0.5) == pytest.approx(8.0)  # four pins, not eight errors
+    assert costs.of([tilt], CARDAN)[0].at(0.5) == pytest.approx(8.0)  # four pins, not eight errors
     table = tmp_path / "costs.toml"
     table.write_text('"pin*.offset_z" = { cost = 3, fixed = 1, at = "0.3 mm", power = 2, least = "0.05 mm" }\n')
-    cost = costs.of([offset], table)[0]
+    cost = costs.of([offset], CARDAN, table)[0]
     assert cost.at(0.5) == pytest.approx(4 * (1 + 2 * (0.3 / 0.075) ** 2))
     assert cost.reach == (pytest.approx(1.0 / 3.0), costs.REACH[1])
     table.write_text('"pin*.tilt_t" = { cost = 3 }\n"pin*.tilt_z" = { cost = 4 }\n', encoding="utf-8")
     with pytest.raises(InputError, match="has two costs for pin1"):
-        costs.of([tilt], table)
+        costs.of([tilt], CARDAN, table)
 
 
 def test_widths_in_the_costs_may_have_the_sign_of_the_drawing(tmp_path: Path) -> None:
@@ -216,18 +217,18 @@ def test_widths_in_the_costs_may_have_the_sign_of_the_drawing(tmp_path: Path) ->
     (position,) = scaling.tolerances(plan)
     table = tmp_path / "costs.toml"
     table.write_text('"*_pins.position" = { at = "⌀0.15 mm", most = "0.6 mm" }\n', encoding="utf-8")
-    (cost,) = costs.of([position], table)
+    (cost,) = costs.of([position], CARDAN, table)
     assert (cost.at(1.0), cost.reach[1]) == (pytest.approx(2 * 0.5), pytest.approx(2.0))  # of two pairs of pins
     table.write_text('"*_pins.position" = { at = "±0.15 mm" }\n', encoding="utf-8")
     with pytest.raises(InputError, match="is a band where another quantity is meant"):
-        costs.of([position], table)
+        costs.of([position], CARDAN, table)
 
 
 def test_steps_are_those_of_a_drawing() -> None:
     fit = '[tolerances]\nfit = { basic = "76 mm", code = "H8/e8", distribution = "normal", cpk = 1.0 }\n'
     plan = study.load(Path("made.toml"), text=TEXT.replace("[tolerances]\n", fit))
     tolerances = scaling.tolerances(plan)
-    by_line = {own.line.label: own for own in ladder.ladders(plan, tolerances, costs.of(tolerances))}
+    by_line = {own.line.label: own for own in ladder.ladders(plan, tolerances, costs.of(tolerances, CARDAN))}
     offset, fitted = by_line["pin*.offset_z"], by_line["fit H8/e8"]
     near = [offset.rungs[offset.drawn + k].words for k in (-2, -1, 0, 1, 2)]
     assert near == ["±0.1 mm", "±0.125 mm", "±0.15 mm", "class m (±0.3 mm)", "±0.4 mm"]

@@ -9,12 +9,14 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
+from tests.support.mechanisms import bushing_kind
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.work import Work
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, NotApplicable, StoreError
-from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.common.tables import Simulation, Status, tables
 from tolstat.questions.assumptions import answer as run
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.variations import BETTER, evaluate
@@ -68,9 +70,10 @@ NAMES = ["shaft slides", "arm length (l_f 30 mm)", "arm length (l_f 45 mm)", PLA
 
 def stand_in(params, options, histories="none", n_harmonics=0, slides=0.0, arm=0.0):
     """Loads at 100 N m from an offset, 40 N a sigma above 640 N; `slides` N where the shaft does, `arm` N a mm."""
-    results = np.zeros(len(params), RESULT)
+    results = np.zeros(len(params), tables(CARDAN).RESULT)
     offset = params["pin_point"][:, 1, 2] / 5e-5
-    load = 640.0 + 40.0 * np.abs(offset) + slides * params["slides"] + arm * 1e3 * (params["l_f"] - 0.03749)
+    length = params["marker"][:, bushing_kind("output fork"), 0, 2]
+    load = 640.0 + 40.0 * np.abs(offset) + slides * params["slides"] + arm * 1e3 * (length - 0.03749)
     results["F_max"][:] = (params["torque"] / 100.0 * load)[:, None]
     results["status"], results["settled"] = Status.OK, 1
     stationary.fill_intervals(results)
@@ -84,7 +87,7 @@ def made(folder, text=TEXT, solver=stand_in):
 
 def stand_in_with(patch, **effects):
     patch.setattr(blocks, "simulate_rows", partial(stand_in, **effects))
-    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
 
 
 @pytest.fixture

@@ -13,15 +13,15 @@ import tolstat
 from tests.support import synthetic, views
 from tolstat import joint
 from tolstat.analysis.binomial import clopper_pearson, needed
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.columns import result_columns
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence, Table
 from tolstat.joint import Operation
 from tolstat.questions.bearing_life import answer as question
-from tolstat.questions.bearing_life.lives import LOADED, PLACES, below_rows, lives_of
+from tolstat.questions.bearing_life.lives import LOADED, below_rows, lives_of
 from tolstat.store.recorded import operating_points
 from tolstat.study.points import Point
 
@@ -192,7 +192,7 @@ def test_shares_and_quantiles_are_those_of_the_lives():
     assert 20 < count < 180
     assert (table.loc["joint", "count"], table.loc["joint", "n"]) == (count, 200)
     assert (table.loc["joint", "lower"], table.loc["joint", "upper"]) == clopper_pearson(count, 200)
-    assert list(table.index) == list(PLACES)
+    assert list(table.index) == ["pin1", "pin2", "pin3", "pin4", "joint"]
     row = tolstat.bearing_life(view()).frame("lives").set_index(["place", "share"]).loc[("joint", 0.9)]
     assert (hours >= row["estimate"]).mean() == pytest.approx(0.9)
     assert row["lower"] < row["estimate"] < row["upper"]
@@ -227,7 +227,7 @@ def test_half_of_the_joints_failed_gives_no_verdict():
     made = view(failed=100)
     assert said(made, "lead")[0].startswith("No verdict: 100 of 200 joints have no life")
     assert not any("reach it with C" in words for words in said(made))
-    assert question.BELOW[2].cell(tolstat.bearing_life(made).tables["below_required"].rows[-1]) == "-"
+    assert question.BELOW[1].cell(tolstat.bearing_life(made).tables["below_required"].rows[-1]) == "-"
 
 
 @pytest.mark.parametrize("alpha", [0.0, np.radians(6.2), -np.radians(3)])
@@ -341,7 +341,7 @@ def test_the_bearing_is_that_of_the_study_given_in_place_of_the_stored_one(tmp_p
 def test_refused_files():
     with pytest.raises(StoreError, match="joint without bearings"):
         lives_of(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json")))
-    some = tuple(column for column in RESULT_COLUMNS if column.name != "pin2.equivalent_load")
+    some = tuple(column for column in result_columns(CARDAN) if column.name != "pin2.equivalent_load")
     with pytest.raises(StoreError, match="does not keep the equivalent loads"):
         lives_of(view(columns=some))
     with pytest.raises(StoreError, match="no sample"):
@@ -414,4 +414,4 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
         second = lives_of(store.view())
         assert store.created == created
     np.testing.assert_allclose(second.hours, 2 ** (10 / 3) * first.hours)
-    assert np.isfinite(second.hours[:, : len(PINS)]).all()
+    assert np.isfinite(second.hours[:, : len(CARDAN.pairs)]).all()

@@ -31,7 +31,7 @@ NOTHING = "hole1.tilt_t={ plus_minus = '0.1 deg', distribution = 'normal' }"
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The stand-in takes the place of the solver, in this process."""
     monkeypatch.setattr(blocks, "simulate_rows", stand_in)
-    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
 
 
 def made(folder: Path, text: str = TEXT, name: str = "made", solver: Callable[..., Any] = stand_in) -> Path:
@@ -188,7 +188,7 @@ def test_files_are_written_before_the_answer_is_printed(tmp_path: Path, monkeypa
     def ended(*_: Any) -> None:
         raise BrokenPipeError
 
-    monkeypatch.setattr("tolstat.cli._command.deliver", ended)
+    monkeypatch.setattr("tolstat.cli._shared._print_parts", ended)
     done = call("change", made(tmp_path), "--set", "pin*.tilt_t.cpk=2", "--workers", 1, "--out", tmp_path / "x.toml")
     assert isinstance(done.exception, BrokenPipeError)
     assert "cpk = 2" in (tmp_path / "x.toml").read_text()

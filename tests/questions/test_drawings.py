@@ -15,22 +15,23 @@ from typer.testing import CliRunner
 
 from tests.support import naive, synthetic
 from tests.support.environment import ROOT
+from tests.support.mechanisms import triads
 from tolstat import joint as joints
 from tolstat.cli import app
-from tolstat.common.load_kinds import PINS
-from tolstat.common.loads import LOADS
-from tolstat.common.tables import HOLES
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
+from tolstat.common.loads import loads_of
+from tolstat.common.mechanism import features
 from tolstat.display import drawing
 from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
 from tolstat.questions.drawings import answer, views
 from tolstat.questions.drawings.views import FRONT, MEANINGS, SIDE
 from tolstat.store import ResultFile
 
 ALPHA = 0.3
 OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 SLIM = {
     "cross": {"R": "40 mm", "r_b": "20 mm"},
     "pin": {"l": "25 mm", "d": "18 mm"},
@@ -66,38 +67,41 @@ def along(arrow):
     return way / np.hypot(*way)
 
 
-def axes_of_parts():
-    """Axes e, t, z of pins and arms in ground axes at the input angle 0, from the kernel's triads, (8, 3, 3)."""
-    frames = naive.frames(0.0, ALPHA)
-    return np.array([TRIAD[body] @ frames[FRAME[body]].T for body in range(PIN, ARM + 4)])
+TRIAD = dict(zip(CARDAN.bodies, triads(), strict=False))
+"""Axes e, t, z of each lump in axes of its member, as the kernel has them."""
+
+
+def attitudes(params):
+    """Attitudes of all bodies in ground axes at the input angle 0, by name."""
+    return dict(zip(CARDAN.bodies, naive.ideal_attitudes(0.0, params(ALPHA)[0], CARDAN), strict=True))
 
 
 def test_front_view_has_pins_in_the_holes_of_the_kernels_arms(cirelli):
     found, _ = drawn(views.views(cirelli, ALPHA)[0])
-    for k, arm in enumerate(ARM_OF_PIN):
-        e, t, _ = TRIAD[PIN + k]
+    for k, arm in enumerate(HOLE_OF_PIN):
+        e, t, _ = TRIAD[PINS[k]]
         middle = found[f"front.pin{k + 1}"].mean(axis=0)
         assert middle == pytest.approx(cirelli.cross.R * e[:2])
-        hole = np.mean([found[f"front.arm{arm + 1}.{i}"].mean(axis=0) for i in (1, 2)], axis=0)
+        hole = np.mean([found[f"front.arm{arm}.{i}"].mean(axis=0) for i in (1, 2)], axis=0)
         assert hole == pytest.approx(middle)
         for letter, axis in (("e", e), ("t", t)):
             assert along(found[f"front.pin{k + 1}.{letter}"]) == pytest.approx(axis[:2])
         assert found[f"cross{k + 1}"].mean(axis=0) == pytest.approx(cirelli.cross.r_b * e[:2])
-    assert np.cross(*FRONT) == pytest.approx(TRIAD[PIN, 2])
+    assert np.cross(*FRONT) == pytest.approx(TRIAD["pin1"][2])
 
 
-def test_side_view_has_the_output_fork_at_the_misalignment(cirelli):
+def test_side_view_has_the_output_fork_at_the_misalignment(cirelli, params):
     found, _ = drawn(views.views(cirelli, ALPHA)[1])
-    axes = axes_of_parts()
+    axes = {name: TRIAD[name] @ attitude.T for name, attitude in attitudes(params).items() if name in TRIAD}
     for k in (0, 1):
-        e, _, z = axes[4 + k]
+        e, _, z = axes[HOLES[k]]
         assert along(found[f"side.pin{k + 3}.e"]) == pytest.approx(SIDE @ e)
         marker = cirelli.cross.R * e - cirelli.arm.l_f * z
         assert found[f"fork{k + 1}"].mean(axis=0) == pytest.approx(SIDE @ marker)
     output = np.array([np.sin(ALPHA), 0.0, np.cos(ALPHA)])  # docs/model.md, Frames
     assert found["fork4"].mean(axis=0) == pytest.approx(SIDE @ (cirelli.arm.l_f * output))
     towards = np.cross(*SIDE)
-    assert towards == pytest.approx(axes[0, 0])  # pin 1 is in front
+    assert towards == pytest.approx(axes["pin1"][0])  # pin 1 is in front
     # on the near side a shaft that turns forward moves the way of its axis times the direction towards the reader
     for name, sense in (("turning.input", 1.0), ("turning.output", -1.0)):
         shaft = np.array([0.0, 0.0, 1.0]) if name == "turning.input" else output
@@ -106,13 +110,13 @@ def test_side_view_has_the_output_fork_at_the_misalignment(cirelli):
 
 def test_markers_are_those_of_the_kernels_bushings(cirelli, params):
     """`bushing.markers` gives places in axes of the base: hub, input shaft, output shaft."""
-    frames, (front, side) = naive.frames(0.0, ALPHA), (drawn(panel)[0] for panel in views.views(cirelli, ALPHA))
-    for i, base in enumerate(BUSHING_BASE):
+    base_at, (front, side) = attitudes(params), (drawn(panel)[0] for panel in views.views(cirelli, ALPHA))
+    for i, own in enumerate(CARDAN.bushings):
         _, on_base = bushing.markers(i, params(ALPHA)[0])
-        name, place = f"{('cross', 'fork')[i // 4]}{i % 4 + 1}", frames[FRAME[base]] @ np.array(on_base)
-        if name != "fork3":  # behind fork4
-            found, view = (front, FRONT) if i < 4 else (side, SIDE)
-            assert found[name].mean(axis=0) == pytest.approx(view @ place, abs=1e-12)
+        place = base_at[own.base] @ np.array(on_base)
+        if own.name != "fork3":  # behind fork4
+            found, view = (front, FRONT) if own.base == "hub" else (side, SIDE)
+            assert found[own.name].mean(axis=0) == pytest.approx(view @ place, abs=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -125,19 +129,18 @@ def kinds(cirelli):
 def test_an_error_is_drawn_in_the_sense_that_perturb_gives_it(cirelli, kinds, kind, name):
     """A small positive error of pin 1 or hole 4, in axes of its frame, against the drawing with and without it."""
     feature = {"pin": "pin1", "hole": "hole4"}[name]
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     errors[f"{feature}.{kind}"] = 1e-5
-    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1)))
+    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1, CARDAN)))
     part = f"{feature}.2" if name == "hole" else feature
     moved, ideal = (kinds[f"{kind}.{state}.{part}"] for state in ("moved", "ideal"))
     if kind == "diameter":
         wider = (row["clearance"][0] - before["clearance"][0]) * (1.0 if name == "hole" else -1.0)
         assert np.sign(moved[2, 0] - ideal[2, 0]) == -np.sign(wider) if name == "pin" else np.sign(wider)
         return
-    place, part = (0, "pin") if name == "pin" else (3, "hole")
-    field = f"{part}_{'axis' if kind.startswith('tilt') else 'point'}"
-    change = row[field][place] - before[field][place]
-    e, t, z = TRIAD[PIN if name == "pin" else ARM + 3]
+    field = f"{name}_{'axis' if kind.startswith('tilt') else 'point'}"
+    change = row[field][0] - before[field][0]
+    e, t, z = TRIAD[feature]
     right, up = (z, e) if kind in ("offset_z", "tilt_t") else (-t, e)
     expected = np.array([change @ right, change @ up])
     axis = (moved[1] - moved[0]) - (ideal[1] - ideal[0]) if kind.startswith("tilt") else moved[0] - ideal[0]
@@ -146,34 +149,32 @@ def test_an_error_is_drawn_in_the_sense_that_perturb_gives_it(cirelli, kinds, ki
 
 
 def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_errors):
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
     par, z = perturb(cirelli, OPERATION, errors)[0], cirelli.contact.z
     panel = views.errors_of(cirelli, errors, "", "row")
     (factor,) = map(float, re.findall(r"enlarged (\S+) times", panel.description))
     found, _ = drawn(panel)
-    for i, arm in enumerate(ARM_OF_PIN):
-        e, t, own_z = TRIAD[PIN + i]
+    for i, number in enumerate(HOLE_OF_PIN):
+        e, t, own_z = TRIAD[PINS[i]]
         for way, right in (("along_z", -t), ("along_t", own_z)):
             inner_left, outer_left, outer_right, inner_right = found[f"{way}.{PINS[i]}"]
-            left, other = (found[f"{way}.{HOLES[arm]}.{k}"] for k in (1, 2))
+            left, other = (found[f"{way}.{HOLES[number - 1]}.{k}"] for k in (1, 2))
             for end, s in ((0, -0.5 * z), (1, 0.5 * z)):
-                apart = (
-                    par["pin_point"][i] + s * par["pin_axis"][i] - par["hole_point"][arm] - s * par["hole_axis"][arm]
-                )
+                apart = par["pin_point"][i] + s * par["pin_axis"][i] - par["hole_point"][i] - s * par["hole_axis"][i]
                 drawn_left = (inner_left, outer_left)[end][0] - left[end][0]
                 drawn_right = other[end][0] - (inner_right, outer_right)[end][0]
                 assert drawn_left == pytest.approx(factor * (par["clearance"][i] + apart @ right), abs=2e-8 * factor)
                 assert drawn_right == pytest.approx(factor * (par["clearance"][i] - apart @ right), abs=2e-8 * factor)
             shift = found[f"{way}.{PINS[i]}"].mean(axis=0) - 0.5 * (left + other).mean(axis=0)
-            assert shift[1] == pytest.approx(factor * (par["pin_point"][i] - par["hole_point"][arm]) @ e, abs=1e-9)
+            assert shift[1] == pytest.approx(factor * (par["pin_point"][i] - par["hole_point"][i]) @ e, abs=1e-9)
 
 
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    panel = views.errors_of(fitting, nominal_errors(1), "", "row")
+    panel = views.errors_of(fitting, nominal_errors(1, CARDAN), "", "row")
     assert "enlarged 1 times" in panel.description
     assert drawn(panel)
 
@@ -208,7 +209,7 @@ def test_labels_are_inside_and_apart(over, alpha):
 @pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
 def test_labels_of_errors_are_inside_and_apart(over, random_errors):
     joint = joints.load("cirelli2021", over, "test")
-    errors = nominal_errors(1)
+    errors = nominal_errors(1, CARDAN)
     for name, value in random_errors(6).items():
         errors[name.replace("__", ".")] = value
     for panel in (
@@ -285,7 +286,7 @@ def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
         view, asked = store.view(), Asked(store.path)
         marked = answer.place_of(view, "fork2.T", asked)
         joint, _, part, _ = answer.drawings(view).parts
-        worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
+        worst = {int(view.rows(int(np.argmax(loads_of(CARDAN)[name].of(view.results))))) for name in view.leading}
     places = {name.partition(".")[0] for name in view.leading} - {"psi"}
     assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
     assert "Marked: fork2." in marked.description
@@ -302,4 +303,4 @@ def test_figures_of_the_package(cirelli):
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
     assert tolstat.draw_errors is answer.draw_errors
-    assert len(tolstat.draw_row(cirelli, nominal_errors(1), "one").axes) == 1
+    assert len(tolstat.draw_row(cirelli, nominal_errors(1, CARDAN), "one").axes) == 1

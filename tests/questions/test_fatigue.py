@@ -12,10 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import naive
+from tests.support.of_cardan import BUSHING_LOADS, SHAFT_LOADS
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
-from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, PLANES, SHAFT_LOADS, signals_of
-from tolstat.common.load_kinds import SHAFTS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import components, load_histories, planes, signals_of
+from tolstat.common.load_kinds import kinds
 from tolstat.solver import histories
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]
@@ -131,12 +133,15 @@ def test_cycles_of_pylife():
 
 
 def components_of(history):
-    return [signal.name for signal in COMPONENTS.values() if signal.history == history]
+    return [signal.name for signal in components(CARDAN).values() if signal.history.name == history]
 
 
 def test_cycles_of_a_joint_are_those_of_its_components():
     rng = np.random.default_rng(5)
-    loads = {history.name: rng.normal(size=(40, *history.shape)) + np.arange(6) for history in LOAD_HISTORIES}
+    loads = {
+        history.name: rng.normal(size=(40, *history.shape)) + np.arange(6)
+        for history in load_histories(CARDAN).values()
+    }
     loads["loads"][:, 7] *= 1e-6  # cycles below the gate
     loads["shafts"][:, 0] *= 2e-4  # some of them are
     counted = histories.cycles(loads)
@@ -148,11 +153,11 @@ def test_cycles_of_a_joint_are_those_of_its_components():
         "N": np.linalg.norm(bushing[..., :3], axis=-1).max(),
         "N*m": np.linalg.norm(bushing[..., 3:], axis=-1).max(),
     }
-    for history in LOAD_HISTORIES:
+    for history in load_histories(CARDAN).values():
         kept, number = (counted[f"{history.prefix}{name}"] for name in ("cycles", "cycle_count"))
-        for c, name in enumerate(components_of(history)):
+        for c, name in enumerate(components_of(history.name)):
             signal = loads[history.name][:, c // 6, c % 6]
-            ranges, means = histories.periodic(signal, histories.GATE * largest[COMPONENTS[name].unit])
+            ranges, means = histories.periodic(signal, histories.GATE * largest[components(CARDAN)[name].unit])
             assert number[c] == len(ranges), name
             if len(ranges) == 0:  # the level of a load that hardly varies
                 ranges, means = np.array([np.ptp(signal)]), np.array([0.5 * (signal.max() + signal.min())])
@@ -171,29 +176,29 @@ def test_cycles_of_a_joint_are_those_of_its_components():
 
 def test_cycles_along_a_direction_are_those_of_the_sum():
     rng = np.random.default_rng(6)
-    loads = {history.name: rng.normal(size=(40, *history.shape)) for history in LOAD_HISTORIES}
+    loads = {history.name: rng.normal(size=(40, *history.shape)) for history in load_histories(CARDAN).values()}
     places = {"cross2.F": ("loads", 1, 1, 2), "fork3.T": ("loads", 6, 3, 4), "output.lateral": ("shafts", 1, 0, 1)}
     for plane, (history, place, x, y) in places.items():
         first, second = loads[history][:, place, x], loads[history][:, place, y]
-        ranges, _, number = histories.count(loads, signals_of(f"{plane} at 30 deg"), kept=40)
+        ranges, _, number = histories.count(loads, signals_of(f"{plane} at 30 deg", CARDAN), kept=40)
         gate = 0.01  # above that of the count
         expected = histories.periodic(np.sqrt(0.75) * first + 0.5 * second, gate)[0]
         np.testing.assert_allclose(ranges[0][ranges[0] > gate], expected, rtol=1e-12)
         assert number[0] >= len(expected)
-        every = signals_of(f"{plane} at worst")
+        every = signals_of(f"{plane} at worst", CARDAN)
         counted = Cycles.of_revolution(
             tuple(signal.name for signal in every), *(table[None] for table in histories.count(loads, every, kept=40))
         )
         fine = [f"{plane} at {angle:g} deg" for angle in np.arange(0.0, 180.0, 0.5)]
-        single = histories.count(loads, tuple(signal for name in fine for signal in signals_of(name)), kept=40)
+        single = histories.count(loads, tuple(signal for name in fine for signal in signals_of(name, CARDAN)), kept=40)
         along = Cycles.of_revolution(tuple(fine), *(table[None] for table in single))
         worst = counted.worst(5.0)
         assert worst.channels == (f"{plane} at worst",)
         most, reached = cycles.equivalent_load(along, 5.0).max(), cycles.equivalent_load(worst, 5.0)[0, 0]
         assert most * (1 - 0.0022) < reached <= most
-    assert set(PLANES) == {
+    assert set(planes(CARDAN)) == {
         *(f"{place}{i}.{kind}" for place in ("cross", "fork") for i in (1, 2, 3, 4) for kind in "FT"),
-        *(f"{shaft}.{kind}" for shaft in SHAFTS for kind in ("lateral", "moment")),
+        *(f"{shaft}.{kind}" for shaft in kinds(CARDAN)["lateral"].places for kind in ("lateral", "moment")),
     }
 
 
@@ -251,13 +256,13 @@ def largest(signal, k):
 def test_small_cycles_are_those_below_a_share_of_the_largest_load_of_their_kind():
     """Cycles just below and above the gate: forces of 1000 N, torques of 10 N m, on bushings and on shafts."""
     waves = np.outer(np.tile([0.5, -0.5], 4) * histories.GATE, [0.99, 1.02])
-    loads = {history.name: np.zeros((8, len(history.places), 6)) for history in LOAD_HISTORIES}
+    loads = {history.name: np.zeros((8, len(history.places), 6)) for history in load_histories(CARDAN).values()}
     for values in loads.values():
         values[:, :2, 0], values[:, :2, 5] = 1000.0 * (waves + 0.9), 10.0 * (waves + 0.9)
     loads["loads"][0, 2, 1], loads["loads"][0, 2, 4] = 1000.0, 10.0
     counted = histories.cycles(loads)
-    for history in LOAD_HISTORIES:
-        names = components_of(history)
+    for history in load_histories(CARDAN).values():
+        names = components_of(history.name)
         numbers = dict(zip(names, counted[f"{history.prefix}cycle_count"], strict=True))
         for component in (history.components[0], history.components[5]):
             assert [numbers[f"{place}.{component}"] for place in history.places[:2]] == [0, 4]

@@ -16,6 +16,7 @@ from tests.support import synthetic
 from tests.support.environment import ROOT
 from tests.support.reports import call
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
+from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import SIMULATED
@@ -84,7 +85,7 @@ def cycles(path):
 
 
 def cycles_of(store, slots, names=SHOWN):
-    return of_slots(store, slots, [signal for name in names for signal in signals_of(name)])[0]
+    return of_slots(store, slots, [signal for name in names for signal in signals_of(name, CARDAN)])[0]
 
 
 def load_cycles(file, names=None, samples=None):
@@ -104,7 +105,7 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
     both, _ = cycles(campaign("harmonics+cycles"))
     np.testing.assert_array_equal(both.ranges, counted.ranges)
     load = equivalent_load(counted, 4.0)[valid]
-    torque = np.array([unit_of(name) != "N" for name in counted.channels])
+    torque = np.array([unit_of(name, CARDAN) != "N" for name in counted.channels])
     scale = np.where(torque, load[:, torque].max(), load[:, ~torque].max())
     for kind, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
         other, _ = cycles(campaign(kind))
@@ -313,13 +314,16 @@ def test_a_campaign_without_a_valid_joint(tmp_path):
 
 
 def test_channels_are_selected_by_patterns():
-    assert channels(["cross2.F_t", "cross[12].F_?", "output.lateral at 0.5 rad", "cross*.T at worst"]) == (
+    assert channels(["cross2.F_t", "cross[12].F_?", "output.lateral at 0.5 rad", "cross*.T at worst"], CARDAN) == (
         *(f"cross{i}.F_{axis}" for i in (1, 2) for axis in "etz"),
         "output.lateral at 28.6478898 deg",
         *(f"cross{i}.T at worst" for i in (1, 2, 3, 4)),
     )  # fmt: skip
     with pytest.raises(InputError) as error:
-        channels(["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "cross1.F at 3 mm", "input.drive at worst"])
+        channels(
+            ["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "cross1.F at 3 mm", "input.drive at worst"],
+            CARDAN,
+        )
     found = {fault.place: (fault.found, fault.remedy) for fault in error.value.faults}
     unsigned = "has no sign: its cycles are not those of the load"
     directions = 'fork1.F_e, fork1.F_t, fork1.F_z, or "fork1.F at 30 deg", "fork1.F at worst"'
@@ -444,8 +448,13 @@ def test_spectra_fall_and_four_are_drawn(campaign):
         assert (np.diff(part["estimate"]) <= 0).all()
         assert (part["lower"] <= part["estimate"]).all()
         assert (part["estimate"] <= part["upper"]).all()
-    assert [name[:4] for name in fatigue.leading(fatigue.equivalent_loads(loading))] == ["cros", "cros", "fork", "fork"]
-    assert fatigue.most_loaded(fatigue.equivalent_loads(loading))[-1].startswith("fork4.T_")
+    assert [name[:4] for name in fatigue.leading(fatigue.equivalent_loads(loading), CARDAN)] == [
+        "cros",
+        "cros",
+        "fork",
+        "fork",
+    ]
+    assert fatigue.most_loaded(fatigue.equivalent_loads(loading), CARDAN)[-1].startswith("fork4.T_")
 
 
 def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):

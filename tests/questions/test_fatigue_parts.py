@@ -18,8 +18,9 @@ from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.questions.fatigue import counting, parts
@@ -113,7 +114,7 @@ def test_stress_is_formed_before_cycles_are_counted(campaign):
     with ResultFile.open(campaign()) as store:
         loads = store.histories("loads", np.arange(store.n)).astype(float)
     for p, own in enumerate(settings.points):
-        at = loads[:, :, BUSHINGS.index(own.bushing)]
+        at = loads[:, :, kinds(CARDAN)["F"].places.index(own.bushing)]
         signal = {"weld": 2.5e3 * at[..., 2] - 2e5 * at[..., 3], "pin root": 2e5 * at[..., 4]}[own.name.split(",")[0]]
         for stressed, first in ((found.cycles, 1), (found.nominal, 0)):
             for i in range(len(stressed.low)):
@@ -244,12 +245,12 @@ point.b = { bushing = "cross1", T_tz = "2 MPa/Nm", F_e = "1 MPa/kN", M = 0.3, k 
 
 def bent(monkeypatch, moments, force=0.0, number=0):
     """Damage in a revolution of a point of `ROUND`, at moments about t and z over it, N m, and a force along e, N."""
-    loads = np.zeros((1, len(moments[0]), len(BUSHINGS), 6))
+    loads = np.zeros((1, len(moments[0]), len(CARDAN.bushings), 6))
     loads[0, :, 0, 0], loads[0, :, 0, 4], loads[0, :, 0, 5] = force, *moments
     monkeypatch.setattr(counting.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
     settings = of_text(ROUND, "a.toml")
     settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
-    found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points), kept=180)
+    found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points, CARDAN), kept=180)
     return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
 
 

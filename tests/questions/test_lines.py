@@ -22,8 +22,9 @@ from tolstat.campaign.extend import extend
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, NotApplicable, StoreError
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import loads_of
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence
@@ -55,7 +56,7 @@ def loaded(folder, text=TEXT):
 
 def stand_in_with(patch):
     patch.setattr(blocks, "simulate_rows", stand_in)
-    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda **_: None)
     patch.setattr(runner, "FIRST", 512)
     patch.setattr(runner, "MOST", 1024)
 
@@ -225,7 +226,7 @@ def test_loads_with_another_fit_are_those_of_the_study_with_that_fit(tmp_path, m
     errors = sampling.draw(other)[other.first_sample :]
     results = simulate_rows(perturb(other.joint, other.operation, errors), other.solver.options()).results
     for name in found.names:
-        assert found.valid([name]).tobytes() == LOADS[name].of(results).tobytes()
+        assert found.valid([name]).tobytes() == loads_of(CARDAN)[name].of(results).tobytes()
 
 
 def by_clearance(params, options, histories="none", n_harmonics=0):

@@ -14,6 +14,7 @@ from tolstat import sampling
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
@@ -97,7 +98,7 @@ def test_joints_that_share_lots_are_not_independent_anywhere():
 
 
 def test_what_needs_independent_joints_is_refused(tmp_path):
-    rule = stop_rule.parse("P(cross1.F > 700 N) width < 0.1", {})
+    rule = stop_rule.parse("P(cross1.F > 700 N) width < 0.1", {}, CARDAN)
     with pytest.raises(InputError, match="share lots"):
         stop_rule.run_until(_study(tmp_path, 2), tmp_path / "a.h5", rule, print)
 

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import synthetic
 from tolstat import cli, sampling, study
-from tolstat.common.load_kinds import ORDERS, SHAFTS
-from tolstat.common.loads import LOADS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import ORDERS, kinds
+from tolstat.common.loads import loads_of
 from tolstat.common.tables import Options, Simulation
 from tolstat.display import drawing
 from tolstat.display.answer import Asked
@@ -83,8 +84,8 @@ def test_quantiles_of_each_amplitude_with_their_order_statistics(invented):
     assert list(found.tables) == ["amplitudes"]
     assert len(found.tables["amplitudes"].rows) == 6 * len(ORDERS)
     for row in found.tables["amplitudes"].rows:
-        values = np.sort(LOADS[row["load"]].of(own))
-        assert row["nominal"] == LOADS[row["load"]].of(nominal)[0]
+        values = np.sort(loads_of(CARDAN)[row["load"]].of(own))
+        assert row["nominal"] == loads_of(CARDAN)[row["load"]].of(nominal)[0]
         assert row["load"] == f"{row['quantity']}_{row['order']}x"
         for key, share in (("q5", 0.05), ("qmedian", 0.5), ("q95", 0.95)):
             assert row[key] == np.quantile(values, share, method="inverted_cdf")
@@ -121,8 +122,12 @@ def test_orbits_simulated_again_are_those_of_the_histories_and_have_the_stored_o
     for path in slow:
         with ResultFile.open(path) as store:
             found.append(orders(store.view(), orbits=True))
-            load = {shaft: store.view().load(f"{shaft}.lateral") for shaft in SHAFTS}
-            stored = {name: LOADS[name].of(store.results(slice(0, None))) for name in LOADS if "lateral_" in name}
+            load = {shaft: store.view().load(f"{shaft}.lateral") for shaft in kinds(CARDAN)["lateral"].places}
+            stored = {
+                name: load.of(store.results(slice(0, None)))
+                for name, load in loads_of(CARDAN).items()
+                if "lateral_" in name
+            }
     assert [one.facts["origin"] for one in found] == ["simulated again", "stored"]
     assert [one.facts["apart"] for one in found] == [0.0, 0.0]
     orbits = [orbits_of(one) for one in found]
@@ -169,7 +174,7 @@ def test_a_force_that_turns_and_one_that_swings_have_orbits_with_the_same_semi_a
             assert axes == pytest.approx([22, 0], abs=1e-5)
             assert np.ptp(np.linalg.norm(orbit.force - [5.0, 0.0], axis=1)) > 20
         if orbit.near == "95 %":
-            largest = np.argsort(results["lateral_max"][1:, SHAFTS.index(orbit.shaft)])
+            largest = np.argsort(results["lateral_max"][1:, kinds(CARDAN)["lateral"].places.index(orbit.shaft)])
             assert orbit.row == 1 + largest[56]  # the 57th of 60 joints
 
 
@@ -191,7 +196,7 @@ def test_of_several_points_an_amplitude_is_the_largest_and_an_orbit_that_of_the_
     assert tables["all"].loc[name, "qmedian"] == tables["bent"].loc[name, "qmedian"]
     assert tables["bent"].loc[name, "qmedian"] > 3 * tables["flat"].loc[name, "qmedian"]
     of_all, of_bent, of_flat = (orbits_of(one) for one in (found, bent, flat))
-    for shaft in SHAFTS:
+    for shaft in kinds(CARDAN)["lateral"].places:
         largest = {
             one[0].point: max(np.abs(own.force).max() for own in one if own.shaft == shaft)
             for one in (of_bent, of_flat)
@@ -216,7 +221,9 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
     assert found.frame("amplitudes")["q95_upper"].isna().all()
     for orbit in orbits_of(found):
         size = np.linalg.norm(orbit.force, axis=1).max()
-        assert size == pytest.approx(own[orbit.row, SHAFTS.index(orbit.shaft)], rel=1e-2, abs=1e-3)
+        assert size == pytest.approx(
+            own[orbit.row, kinds(CARDAN)["lateral"].places.index(orbit.shaft)], rel=1e-2, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,9 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign import subset as simulation
 from tolstat.campaign.work import Work
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import PARAM, RESULT, Simulation, Status
+from tolstat.common.tables import Simulation, Status, tables
 from tolstat.questions import rare as module
 from tolstat.questions.rare import rare, seed_row
 from tolstat.store import ResultFile, Writer, metadata
@@ -116,15 +117,15 @@ def asked(plan, beta=2.5, **more):
 
 
 def perturb(joint, operation, errors):
-    params = np.zeros(len(errors), PARAM)
+    params = np.zeros(len(errors), tables(CARDAN).PARAM)
     params["R"] = sum(errors[f"pin{i}.offset_t"] for i in (1, 2, 3, 4)) * 3e4 / SIGMA
-    params["alpha"] = errors["pin1.offset_t"] * 3e4
+    params["alpha"][:, 0] = errors["pin1.offset_t"] * 3e4
     return params
 
 
 def simulate(params, options, histories="none", n_harmonics=0):
     """A load that is linear in the errors; joints far on the other side fail."""
-    results = np.zeros(len(params), RESULT)
+    results = np.zeros(len(params), tables(CARDAN).RESULT)
     results["status"] = np.where(params["R"] < FAILING, Status.NEWTON_FAILED, Status.OK)
     results["F_max"][:, 0] = np.where(params["R"] < FAILING, np.nan, 700.0 + 100.0 * params["R"])
     return Simulation(results, {})

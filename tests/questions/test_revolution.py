@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 from tests.support import synthetic
 from tolstat import study
 from tolstat.campaign import run as campaign
-from tolstat.common.channels import CHANNELS
-from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.loads import LOADS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import channels
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import loads_of
 from tolstat.display.answer import Asked, Panels, Sentence
 from tolstat.questions.causes.errors import causes, causes_on_page
 from tolstat.questions.causes.revolution import followed, over_angle
@@ -36,7 +37,7 @@ def stores(tmp_path_factory):
     return found
 
 
-FORCES = [f"{place}.F" for place in BUSHINGS]
+FORCES = [f"{place}.F" for place in kinds(CARDAN)["F"].places]
 SHAFTS = ["input.f_x", "output.lateral", "output.moment", "output.axial", "input.drive"]
 
 
@@ -58,7 +59,8 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     assert of(found["full"], FORCES).max(axis=1) == pytest.approx(largest, rel=1e-4)  # between the samples
     for name in SHAFTS[1:]:
         top = found["full"].loads[name].max(axis=1)
-        own, scale = LOADS[name].of(results), largest.max() if LOADS[name].unit == "N" else results["T_max"].max()
+        load = loads_of(CARDAN)[name]
+        own, scale = load.of(results), largest.max() if load.unit == "N" else results["T_max"].max()
         assert top == pytest.approx(own, abs=2e-3 * scale), name
     assert all(np.array_equal(found["full"].loads[name], found["none"].loads[name]) for name in FORCES + SHAFTS)
     np.testing.assert_allclose(of(found["harmonics"], FORCES), of(found["full"], FORCES), rtol=0.02)
@@ -79,7 +81,7 @@ def known(tmp_path, monkeypatch):
         errors = store.errors()[slots]
         one, other = (errors[name][:, None] / SIGMA for name in ("pin1.offset_t", "pin3.offset_z"))
         load = 600.0 + 20.0 * one * np.cos(theta) + 10.0 * other * np.sin(theta)
-        loads = {name: load if CHANNELS[name].unit == "N" else 0.1 * load for name in names}
+        loads = {name: load if channels(CARDAN)[name].unit == "N" else 0.1 * load for name in names}
         return Revolutions(theta, loads, "stored", 0.0)
 
     monkeypatch.setattr(revolutions, "read", invented)
@@ -129,7 +131,7 @@ def test_page_draws_the_leading_loads_over_the_input_angle(known):
     with ResultFile.open(known) as store:
         view = store.view()
         found, none = causes_on_page(view, asked), causes_on_page(view, without)
-        followed = [name for name in view.leading if name in CHANNELS]
+        followed = [name for name in view.leading if name in channels(view.mechanism)]
     keys = [panel.key for block in found.blocks() if isinstance(block, Panels) for panel in block.panels]
     assert asked.notes == []
     assert [key for key in keys if not key.startswith("tornado")] == [f"angle-{x.replace('.', '-')}" for x in followed]

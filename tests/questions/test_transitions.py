@@ -11,7 +11,8 @@ from tests.questions.test_fatigue import needs, of_signals
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
-from tolstat.common.channels import COMPONENTS, LOAD_HISTORIES, signals_of
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import components, load_histories, signals_of
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue.counting import Joints
 from tolstat.solver import histories
@@ -50,12 +51,14 @@ def test_damage_of_a_sequence_is_that_of_the_histories_one_after_the_other(seed)
     rng = np.random.default_rng(seed)
     theta = 2 * np.pi * np.arange(60)[:, None, None] / 60
     signals = tuple(
-        s for name in (*COMPONENTS, "cross1.F at 30 deg", "output.moment at 77 deg") for s in signals_of(name)
+        s
+        for name in (*components(CARDAN), "cross1.F at 30 deg", "output.moment at 77 deg")
+        for s in signals_of(name, CARDAN)
     )
     points = []
     for _ in range(4):
         loads = {}
-        for history in LOAD_HISTORIES:
+        for history in load_histories(CARDAN).values():
             waves = (
                 rng.normal(size=history.shape) * np.cos(k * theta + rng.uniform(0, 6, history.shape)) for k in (1, 2, 3)
             )

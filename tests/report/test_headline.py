@@ -12,7 +12,8 @@ from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.cli import app
-from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.common.cardan import CARDAN
+from tolstat.common.tables import Simulation, Status, tables
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
 from tolstat.display.verdict import WORDS
@@ -34,8 +35,8 @@ def interfering(folder):
     """36 of 61 joints whose pin is larger than its hole; none of the others is above the limit."""
     path = synthetic.store(folder, study(61), simulated=0)
     results = synthetic.results(62)
-    for name in RESULT.names:
-        if RESULT[name].base.kind == "f":
+    for name in tables(CARDAN).RESULT.names:
+        if tables(CARDAN).RESULT[name].base.kind == "f":
             results[name][1:37] = np.nan
     results["status"][1:37], results["settled"][1:37] = Status.OUTSIDE_MODEL, 0
     with Writer.open(path) as store:

@@ -26,8 +26,7 @@ from tolstat.display.html import bound, grouped
 from tolstat.display.table import Table
 from tolstat.questions import joints
 from tolstat.questions.exceedance import rows
-from tolstat.report import headline as verdict
-from tolstat.report import page
+from tolstat.report import headline, page
 from tolstat.store import Reader, ResultFile, revolutions
 from tolstat.store.recorded import recall
 from tolstat.store.worst import MAX_LISTED
@@ -285,15 +284,15 @@ def test_limits_and_their_verdicts_stand_on_the_page(view, html):
 def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
     counted = {"n": 100, "n_failed": 0, "n_unsettled": 0, "count": 4, "bound_lower": 0.04, "bound_upper": 0.04}
     wide = counted | {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
-    assert verdict.verdict(wide, 0.05) == answer
+    assert rows.verdict(wide, 0.05) == answer
     narrow = counted | {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
-    assert verdict.verdict(narrow, 0.05) == answer
-    assert verdict.verdict(narrow, np.nan) == ""
-    assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "none"
+    assert rows.verdict(narrow, 0.05) == answer
+    assert rows.verdict(narrow, np.nan) == ""
+    assert rows.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "none"
 
 
 def test_reader_holds_the_shares_that_are_counted(view, html):
-    assert f"<option selected>{verdict.headline(view, 0.05).load}</option>" in html
+    assert f"<option selected>{headline.headline(view, 0.05).load}</option>" in html
     curves = rows.readings(view)
     assert list(curves) == [*view.bushing_loads, "pin1.contact", "psi"]
     status = view.status
@@ -318,7 +317,7 @@ def test_reader_begins_with_the_limit_that_the_verdict_names(tmp_path, limits, n
     path = synthetic.store(tmp_path, text)
     with ResultFile.open(path) as store:
         view = store.view()
-        assert verdict.headline(view, 0.05).load == name
+        assert headline.headline(view, 0.05).load == name
         made = page.compose(view, Asked(path, 0.05))
     (reader,) = (block for section in made.sections for block in section.blocks if isinstance(block, blocks.Reader))
     assert reader.start == name

@@ -14,8 +14,9 @@ from tests.support import reports, synthetic
 from tests.support.environment import ROOT
 from tests.support.views import swept, view
 from tolstat import joint
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Status
 from tolstat.display import style
 from tolstat.display.table import fitted
@@ -43,11 +44,11 @@ def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
     assert list(table["load"]) == ["fork3.T", "pin2.contact", "psi"]
     assert list(table["unit"]) == ["N*m", "N", "1"]
     assert list(table["count"]) == [
-        int((made.results["T_max"][:, BUSHINGS.index("fork3")] > 18.0).sum()),
+        int((made.results["T_max"][:, kinds(CARDAN)["T"].places.index("fork3")] > 18.0).sum()),
         int((made.results["contact_max"][:, 1].max(axis=1) > 650.0).sum()),
         int((made.results["psi_max"] > 1.1e-4).sum()),
     ]
-    assert table["nominal"][0] == made.nominal["T_max"][0, BUSHINGS.index("fork3")]
+    assert table["nominal"][0] == made.nominal["T_max"][0, kinds(CARDAN)["T"].places.index("fork3")]
 
 
 def test_failed_and_unsettled_joints_are_counted_both_ways():
@@ -138,7 +139,7 @@ def overlapping(figure):
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: sheet(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
+        lambda: sheet(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in kinds(CARDAN)["F"].places})),
         lambda: sheet(view(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
         lambda: sweep.sheet(swept(limits={"cross1.F": 800.0})),
         lambda: sweep.sheet(swept(9)),

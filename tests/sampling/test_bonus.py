@@ -12,14 +12,16 @@ from scipy.special import ndtr
 
 from tests.support.synthetic import HEAD
 from tolstat import joint, sampling, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
+from tolstat.common.mechanism import features
 from tolstat.study import scaling
 from tolstat.study.axes import Bonus
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal, Uniform
 from tolstat.study.tolerances.entry import meanings
 from tolstat.study.tolerances.zone_laws import Accepted
+
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 
 N = 4096
 ZONE, OVER, HALF = 0.1e-3, 22e-3, 30e-6

@@ -13,8 +13,9 @@ from scipy import stats
 
 from tests.support.synthetic import HEAD
 from tolstat import sampling, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
-from tolstat.common.tables import ERROR, ERROR_FIELDS
+from tolstat.common.tables import tables
 from tolstat.study import Study
 
 BASE = (
@@ -51,10 +52,10 @@ def make(tmp_path_factory: pytest.TempPathFactory) -> Make:
 def test_rows(make: Make, method: str) -> None:
     s = make(OFFSET, DIAMETER, method=method, n=5)
     errors = sampling.draw(s)
-    assert errors.dtype == ERROR
+    assert errors.dtype == tables(CARDAN).ERROR
     assert errors.shape == (s.rows,) == (6,)
     nominal = errors[0]
-    assert all(nominal[f.name] == 0 for f in ERROR_FIELDS if f.name[:3] in ("pin", "hol"))
+    assert all(nominal[f.name] == 0 for f in tables(CARDAN).error_fields if f.name[:3] in ("pin", "hol"))
     assert nominal["operation.torque"] == 0.0
     assert nominal["material.E_factor"] == 1.0
     assert (errors["hole2.tilt_t"][1:] == np.radians(0.2)).all()
@@ -178,8 +179,8 @@ def test_sweep_is_a_grid(make: Make, tmp_path: Path) -> None:
 
 
 def test_dimension_table_is_that_of_the_errors() -> None:
-    assert list(sampling.dimensions()) == [f.name for f in ERROR_FIELDS]
-    assert list(sampling.dimensions().values()) == list(range(len(ERROR_FIELDS)))
+    assert list(sampling.dimensions(CARDAN)) == [f.name for f in tables(CARDAN).error_fields]
+    assert list(sampling.dimensions(CARDAN).values()) == list(range(len(tables(CARDAN).error_fields)))
 
 
 KINDS = (

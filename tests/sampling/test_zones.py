@@ -11,13 +11,14 @@ from scipy import stats
 
 from tests.support.synthetic import HEAD
 from tolstat import sampling, study
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
+from tolstat.common.mechanism import features
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
 from tolstat.study import Study, axes
 from tolstat.study.tolerances.entry import meanings
 
+PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
 OVER = 22e-3
 POSITION = 'position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "%s" }\n'
 DIRECTION = '%s" = { zone = "⌀0.04 mm", over = "20 mm", distribution = "%s" }\n'
@@ -75,7 +76,8 @@ def test_the_whole_axis_is_in_its_zone(make: Make, kind: str, second: str) -> No
     params = perturb(s.joint, s.operation, sampling.draw(s))
     for i in range(4):
         for name, triads in (("pin", PIN_TRIADS), ("hole", ARM_TRIADS)):
-            point, axis = params[f"{name}_point"][1:, i], params[f"{name}_axis"][1:, i]
+            row = i if name == "pin" else HOLE_OF_PIN.index(i + 1)
+            point, axis = params[f"{name}_point"][1:, row], params[f"{name}_axis"][1:, row]
             far = np.linalg.norm(_ends(point, axis, triads[i, 0], OVER / 2), axis=2)
             assert 0.9 * 5e-5 < far.max() <= 5e-5 * (1 + 1e-9)
             tilt = np.arccos(np.minimum(axis @ triads[i, 0], 1.0)).max()
@@ -100,7 +102,8 @@ def _features(params: np.ndarray, pair: str, reach: float) -> list[tuple[np.ndar
     for feature in axes.PAIRS[pair]:
         kind, i = feature[:-1], int(feature[-1]) - 1
         e = (PIN_TRIADS if kind == "pin" else ARM_TRIADS)[i, 0]
-        found.append((params[f"{kind}_point"][1:, i] + reach * e, params[f"{kind}_axis"][1:, i], e))
+        row = i if kind == "pin" else HOLE_OF_PIN.index(i + 1)
+        found.append((params[f"{kind}_point"][1:, row] + reach * e, params[f"{kind}_axis"][1:, row], e))
     return found
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Fidelity, Options
 from tolstat.solver import compilation
 
@@ -33,7 +34,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         def kill(self) -> None:
             pass
 
-    def note(name: str, _: Options) -> None:
+    def note(name: str, *_: Any) -> None:
         called.append(name)
 
     noted = {name: partial(note, name) for name in compilation.KERNELS}
@@ -57,7 +58,7 @@ def test_some_kernels_are_compiled_in_a_second_process(calls: list[str]) -> None
 def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str], params: Any) -> None:
     compilation.warm_up(Options(), params())
     assert not {"explicit.explicit", "explicit.count_steps"} & set(calls)
-    reversing = compilation._outside_model(torque_reverses=True)
+    reversing = compilation._outside_model(CARDAN, torque_reverses=True)
     assert set(compilation.kernels(Options(), reversing)) == set(compilation.KERNELS) - {"ideal.ideal_revolution"}
 
 

@@ -10,10 +10,12 @@ import pytest
 from tests.support import fakes
 from tests.support.closed_forms import pin_force
 from tests.support.environment import ROOT
+from tests.support.mechanisms import bushing_kind
+from tests.support.of_cardan import RESULT, blank_params
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
-from tolstat.common.tables import PARAM, RESULT, Fidelity, Options, Simulation, Status
+from tolstat.common.tables import Fidelity, Options, Simulation, Status
 from tolstat.joint import ideal
 from tolstat.solver import fidelity
 from tolstat.solver.fidelity import Rung
@@ -76,7 +78,8 @@ class TestIdeal:
         for k, e in enumerate(((1.0, 0, 0), (-1.0, 0, 0)) if first == 4 else ((0, -1.0, 0), (0, 1.0, 0))):
             triad = np.array([e, np.cross((0, 0, 1.0), e), (0, 0, 1.0)])
             force, torque = loads[:, k, :3] @ triad, loads[:, k, 3:] @ triad
-            marker = par.R[0] * np.array(e) + (0, 0, par.l_f[0] * (1 if first == 6 else -1))
+            kind = bushing_kind("input fork" if first == 4 else "output fork")
+            marker = par.marker[0, kind, 1] @ triad
             total = total + torque + np.cross(marker, force)
         return total
 
@@ -211,7 +214,7 @@ def pretend(errors, differing=()):
 
 
 class TestChoice:
-    PARAMS = np.zeros(4, PARAM)
+    PARAMS = blank_params(4)
     IDEAL, COARSE, FINE = Rung(Fidelity.IDEAL, 90), Rung(Fidelity.QUASISTATIC, 36), Rung(Fidelity.QUASISTATIC, 60)
 
     def choose(self, budget=0.005, loads=(), least=0, errors=(), differing=()):

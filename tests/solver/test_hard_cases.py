@@ -12,14 +12,14 @@ import pytest
 
 from tests.support import synthetic
 from tests.support.environment import ROOT
+from tests.support.of_cardan import LOAD_KINDS, RESULT, RESULT_FIELDS
 from tests.support.reports import build
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.campaign.remedy import remedy
 from tolstat.common.errors import InputError
-from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Options, Status
+from tolstat.common.tables import FAILED, SIMULATED, Options, Status
 from tolstat.questions.sweep import cases
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultFile, Writer, verification

@@ -8,10 +8,10 @@ import pytest
 from tests.conftest import REFERENCE, sliding
 from tests.solver.test_hard_cases import assert_honest
 from tests.support.environment import ROOT
+from tests.support.mechanisms import S
 from tolstat import joint, sampling, study
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.kernel.mechanics.scale import axial_decay, centring_stiffness
-from tolstat.kernel.mechanics.topology import S
 from tolstat.kernel.revolution.trail import make_notes, note_closure, with_slow_decay
 from tolstat.solver.reference import reference_rows
 from tolstat.solver.simulation import equilibrium, simulate_rows, starts

@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import REFERENCE, sliding, with_orders
 from tests.support import naive
 from tests.support.closed_forms import pin_force
+from tests.support.mechanisms import lump_kind
 from tolstat import joint, sampling, study
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.joint import ideal
@@ -126,7 +127,8 @@ def test_torque_that_reverses(params):
     phase = np.linspace(0, 2 * np.pi, 20001)
     theta = np.array([naive.input_angle(x, par[0]) for x in phase])
     turning = np.gradient(np.gradient(ideal.output_angle(theta, alpha), phase), phase)[5:-5] * speed**2
-    inertia = par.Js[0] + 2 * (par.arm_mass[0] * par.R[0] ** 2 + par.arm_inertia[0, 2])
+    arm = lump_kind("arm")
+    inertia = par.Js[0, 0] + 2 * (par.mass[0, arm] * par.R[0] ** 2 + par.inertia[0, arm, 2])
     swing = 30 * np.cos(2 * phase + 1.1)[5:-5] + inertia * turning
     assert ideal.reversal_torque(par)[0] == pytest.approx(-swing.min(), rel=1e-4)
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE
+from tests.support.mechanisms import N_DOF
+from tests.support.of_cardan import KIND, SPAN
 from tolstat import joint, study
-from tolstat.common.load_kinds import KIND, SPAN, measure_of
+from tolstat.common.load_kinds import measure_of
 from tolstat.common.tables import Options, Status
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.solver.reference import first_order, reference_rows
 from tolstat.solver.simulation import simulate_rows
 

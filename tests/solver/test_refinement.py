@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.support.environment import ROOT
+from tests.support.of_cardan import LOAD_KINDS, RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign.remedy import remedy
-from tolstat.common.load_kinds import LOAD_KINDS, measure_of
-from tolstat.common.tables import RESULT, Method, Options, Status
+from tolstat.common.load_kinds import measure_of
+from tolstat.common.tables import Method, Options, Status
 from tolstat.kernel.lanes.batch import make_batch
 from tolstat.kernel.revolution.closeup import STEPS, divide
 from tolstat.solver import refinement

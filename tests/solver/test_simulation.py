@@ -11,11 +11,13 @@ import pytest
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tests.support.closed_forms import pin_force
 from tests.support.environment import ROOT
+from tests.support.mechanisms import lump_kind
+from tests.support.of_cardan import LOAD_KINDS, RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign.remedy import Reason, remedy
-from tolstat.common.load_kinds import LOAD_KINDS, RESULTANT, measure_of
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
+from tolstat.common.load_kinds import RESULTANT, measure_of
+from tolstat.common.tables import SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
 from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work
@@ -108,8 +110,9 @@ def test_bent_ideal_joint_follows_the_closed_form(params, rpm):
     force = pin_force(theta, alpha, 100.0, outer)
     assert force.min() == pytest.approx(596.5, abs=0.1)
     assert force.max() == pytest.approx(596.5 / np.cos(alpha), abs=0.2)
-    arms = 2 * (par.arm_mass[0] * par.R[0] ** 2 + par.arm_inertia[0, 2])
-    torque = 100.0 + (par.Js[0] + arms) * output_acceleration(theta, alpha, omega)
+    arm = lump_kind("arm")
+    arms = 2 * (par.mass[0, arm] * par.R[0] ** 2 + par.inertia[0, arm, 2])
+    torque = 100.0 + (par.Js[0, 0] + arms) * output_acceleration(theta, alpha, omega)
     expected = pin_force(theta, alpha, 1.0, outer) * torque
     total = histories["contact"][:, :, RESULTANT]
     np.testing.assert_allclose(total[:, :2].mean(axis=1), expected, rtol=3e-3)
@@ -306,7 +309,7 @@ def test_not_settled_is_said_and_results_kept(params):
 
 def test_failure_of_newton_is_said_and_nothing_invented(params):
     par = params(alpha=0.3)
-    par.hub_mass[0] = np.nan
+    par.mass[0, lump_kind("hub")] = np.nan
     row = simulate_rows(par, OPTIONS).results[0]
     assert row["status"] == Status.NEWTON_FAILED
     assert np.isnan(row["F_max"]).all()
@@ -314,7 +317,7 @@ def test_failure_of_newton_is_said_and_nothing_invented(params):
 
 def test_without_an_equilibrium_the_remedy_is_dynamic(params):
     par = params(alpha=0.3)
-    par.hub_mass[0] = np.nan
+    par.mass[0, lump_kind("hub")] = np.nan
     row = simulate_rows(par, OPTIONS._replace(fidelity=Fidelity.QUASISTATIC)).results[0]
     said = remedy(row, OPTIONS._asdict())
     assert "no equilibrium" in said
@@ -331,7 +334,7 @@ def test_a_joint_without_torque_ends(params):
 
 def test_a_row_does_not_depend_on_the_rows_before_it(params, random_errors):
     table = np.concatenate([params(alpha=0.2, **random_errors(k)) for k in (1, 2, 3)])
-    table["hub_mass"][1] = np.nan
+    table["mass"][1, lump_kind("hub")] = np.nan
     together = simulate_rows(table, OPTIONS).results
     alone = np.concatenate([simulate_rows(table[k : k + 1], OPTIONS).results for k in (2, 1, 0)])[::-1]
     for name in RESULT.names:

@@ -83,9 +83,8 @@ TOLD = {
     ("errors/pin1.offset_t", "verify --joints 2"): (2, OF_ERRORS),
     ("errors/pin1.offset_t", "merge --out b.h5"): (2, OF_ERRORS),
     **{("metadata", words): (2, OF_METADATA) for words in ("status", "report", "replay --row 10", "extend --n 50")},
-    **{("verify/newton/cross1.F_max", w): (2, OF_VERIFICATION) for w in ("report", "capability")},
+    **{("verify/newton/cross1.F_max", w): (2, OF_VERIFICATION) for w in ("report", "capability", "status")},
     ("verify/rows", "export --statistics -"): (2, OF_VERIFICATION),
-    ("verify/newton/cross1.F_max", "status"): (0, ""),
     **{
         ("histories/cycles", words): (2, OF_HISTORIES) for words in ("fatigue", "export --pylife -", "merge --out b.h5")
     },

@@ -5,8 +5,8 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import synthetic
+from tests.support.of_cardan import ERROR_COLUMNS
 from tolstat import cli
-from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.report import answer as reports
 from tolstat.store import ResultFile, result_file

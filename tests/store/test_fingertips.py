@@ -10,10 +10,10 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
+from tests.support.of_cardan import LOADS
 from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import largest_of
 from tolstat.common.errors import InputError
-from tolstat.common.loads import LOADS
 from tolstat.store import ResultFile, Writer
 
 MAX_REPR = 250

@@ -21,9 +21,9 @@ from tests import make_golden
 from tests.campaign.test_campaign import datasets
 from tests.store.test_store import new_store, simulation
 from tests.support import fakes
+from tests.support.of_cardan import ERROR_COLUMNS, RESULT_COLUMNS
 from tests.support.reading import read_all
 from tolstat.common import tables
-from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION, Mode, Status
 from tolstat.store import ResultFile, Writer, layout, metadata, verification, what_if

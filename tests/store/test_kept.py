@@ -15,13 +15,14 @@ from tests.campaign.test_campaign import datasets
 from tests.campaign.test_extend import run, slices, small
 from tests.report.test_report import texts
 from tests.support import damage, fakes, reports, synthetic
+from tests.support.of_cardan import OPTIONAL_FIELDS, RESULT_COLUMNS, blank_others, kept_columns
 from tests.support.views import swept, view
 from tolstat import study
 from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
 from tolstat.campaign.verify import QUICK_CHECKS
-from tolstat.common.columns import KEPT, OPTIONAL_FIELDS, RESULT_COLUMNS, blank_others, kept_columns
+from tolstat.common.columns import KEPT
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions import joints as question
 from tolstat.questions import sweep

@@ -5,8 +5,8 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.questions.test_causes import TEXT, made
+from tests.support.of_cardan import LOAD_FIELDS
 from tolstat.cli import app
-from tolstat.common.loads import LOAD_FIELDS
 from tolstat.store import ResultFile, reader, view, worst
 
 BLOCK = 256

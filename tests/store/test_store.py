@@ -17,8 +17,8 @@ import pytest
 import tolstat
 from tests import format_tables
 from tests.support import fakes
+from tests.support.of_cardan import ERROR_COLUMNS, RESULT, RESULT_COLUMNS
 from tolstat.common import tables
-from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Simulation, Status
@@ -53,7 +53,7 @@ def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:
         assert store.pending().tolist() == [0, 4, 5, 6, 10, 11]
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
         written, expected = store.results(), simulation(study, rows)
-        for name in tables.RESULT.names or ():
+        for name in RESULT.names or ():
             np.testing.assert_array_equal(written[name][rows], expected.results[name])
         assert np.isnan(written["F_max"][store.pending()]).all()
         for name in fakes.SPECS:

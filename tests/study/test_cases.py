@@ -11,6 +11,7 @@ import pytest
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
 from tests.support.environment import ROOT
+from tests.support.mechanisms import lump_kind
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError, StoreError
@@ -355,7 +356,7 @@ def test_the_paper_as_printed() -> None:
     c_d = 2 * 0.05 * 0.32 * (np.pi / 0.03641) ** 2 * np.sqrt(210e9 * 1.02e-7 / (7.70e-6 * 11.34e-4))
     assert c_d == pytest.approx(3.71e8, rel=0.01)
     assert printed.contact.c_d == 3.71e8
-    assert joint.perturb(printed, s.operations[0], sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
+    assert joint.perturb(printed, s.operations[0], sampling.draw(s)[:1])["mass"][0, lump_kind("arm")] == 0.3516
 
 
 @pytest.mark.slow

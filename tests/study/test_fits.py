@@ -12,6 +12,7 @@ from scipy import stats
 from tests.support.synthetic import HEAD
 from tolstat import joint, sampling, study
 from tolstat.campaign import plan
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.study import scaling
 from tolstat.study.starter import joint_text
@@ -117,7 +118,7 @@ def test_drawn_clearances_lie_within_the_zones() -> None:
 @pytest.mark.parametrize("contact", ["", 'contact.law = "uniform"', '[joint.contact]\nlaw = "uniform"'])
 def test_a_scaled_fit_becomes_diameters(contact: str) -> None:
     loaded = load(H7_F7, contact)
-    entries = {t.pattern: t.scaled(0.5) for t in scaling.tolerances(loaded) if t.pattern == fits.HOLE}
+    entries = {t.pattern: t.scaled(0.5) for t in scaling.tolerances(loaded) if t.pattern == fits.patterns(CARDAN)[0]}
     again = study.load(Path("x.toml"), text=scaling.rewritten(loaded, entries, 7))
     assert again.joint == loaded.joint
     assert again.tolerances["hole1.diameter"] == distributions.Normal(0.0, 2.5e-6)
@@ -156,16 +157,16 @@ def test_share_of_pins_that_are_larger_than_their_holes() -> None:
 
 def test_a_clearance_fit_may_reach_beyond_its_zones() -> None:
     text = 'basic = "76 mm", code = "H7/h6", distribution = '
-    found = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "normal"}, "x")
+    found = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "normal"}, "x", CARDAN)
     assert found is not None
     assert found.misfit == pytest.approx(stats.norm.sf(24.5 / math.hypot(5.0, 19 / 6)), rel=1e-9)
-    assert fits.any_pair(found.misfit) == pytest.approx(4 * found.misfit, rel=1e-4)
+    assert fits.any_pair(found.misfit, 4) == pytest.approx(4 * found.misfit, rel=1e-4)
     assert found.meaning == [
         "fit H7/h6 at 76 mm: hole 0 to +30 um, pin -19 to 0 um",
         "fit: hole less pin 0 to 49 um, radial clearance 0 to 24.5 um",
         f"fit: {400 * found.misfit:.3g} % of the joints do not go together",
     ]
-    bounded = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "uniform"}, "x")
+    bounded = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "uniform"}, "x", CARDAN)
     assert bounded is not None
     assert bounded.misfit == 0.0
     assert len(bounded.meaning) == 2

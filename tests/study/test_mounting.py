@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.of_cardan import without_results
 from tolstat import sampling, study
 from tolstat.campaign import remedy
 from tolstat.common.errors import InputError
-from tolstat.common.tables import Options, Simulation, without_results
+from tolstat.common.tables import Options, Simulation
 from tolstat.joint import operating, perturb
 from tolstat.solver import fidelity
 from tolstat.study.points import note_on_shafts

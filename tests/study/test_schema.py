@@ -8,6 +8,7 @@ import re
 import tomllib
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any
 
 import jsonschema
@@ -19,11 +20,13 @@ from typer.testing import CliRunner
 from tests.support.environment import ROOT
 from tolstat import joint, study
 from tolstat.cli import app
+from tolstat.common.cardan import MECHANISMS
 from tolstat.common.errors import InputError
+from tolstat.common.loads import units_of_limits
 from tolstat.common.strict import Strict
 from tolstat.study import schema, starter
 from tolstat.study.model import Subset
-from tolstat.study.selection import TOLERANCED, Entry, resolve
+from tolstat.study.selection import Entry, resolve, toleranced_units
 from tolstat.study.tolerances.entry import Site
 
 VALIDATORS = {kind: jsonschema.Draft7Validator(schema.schema(kind)) for kind in schema.KINDS}
@@ -161,14 +164,17 @@ def pattern(random_numbers: random.Random, word: str) -> str:
 
 @pytest.mark.parametrize(
     ("units", "made"),
-    [(TOLERANCED, schema.sections()["tolerances"]), (schema.UNIT_OF_LIMIT, schema.sections()["limits"])],
+    [
+        (names(mechanism), schema.sections()[section])
+        for section, names in (("tolerances", toleranced_units), ("limits", units_of_limits))
+        for mechanism in MECHANISMS.values()
+    ],
 )
 def test_no_pattern_that_selects_something_is_refused(units: dict[str, str], made: dict[str, Any]) -> None:
     numbers, selecting = random.Random(5), 0
     keys = [re.compile(key) for key in made["patternProperties"]]
     for _ in range(300):
-        feature, dot, half = numbers.choice(list(units)).partition(".")
-        key = pattern(numbers, feature) + dot + pattern(numbers, half)
+        key = ".".join(pattern(numbers, part) for part in numbers.choice(list(units)).split("."))
         try:
             resolve(Entry(key, (key,), None), units, "")
         except InputError:
@@ -200,8 +206,9 @@ def readable(field: FieldInfo, example: object) -> bool:
     """Whether an example of a key can be read, as a value for an error that is a length or an angle."""
     adapter: TypeAdapter[Any] = TypeAdapter(Annotated[field.annotation, *field.metadata, None])
     for unit in ("m", "rad"):
+        site = Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")
         with suppress(ValidationError):
-            adapter.validate_python(example, context={"site": Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")})
+            adapter.validate_python(example, context={"site": site, "tolerance": SimpleNamespace(site=site, mark="")})
             return True
     return False
 

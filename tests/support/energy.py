@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import PARAM, Options, Status
+from tests.support.of_cardan import PARAM
+from tolstat.common.tables import Options, Status
 
 STORED = ("kinetic", "bushings", "contacts", "support")
 GAINS = {
@@ -31,7 +32,7 @@ class Trajectory(NamedTuple):
     ----------
     t : ndarray, shape (n,)
         Time, s.
-    points : ndarray, shape (n, 3, 56)
+    points : ndarray, shape (n, 3, dof)
         Deviations q from the ideal motion (m, rad), their rates and accelerations.
     status : Status
         ``OK``, ``NEWTON_FAILED`` or ``OUTSIDE_MODEL``.
@@ -135,8 +136,7 @@ def balance(joint: NDArray[np.void], options: Options, trajectory: Trajectory) -
 def _gauges(joint: NDArray[np.void]) -> np.recarray[Any, np.dtype[np.void]]:
     """Rows of PARAM that `kernel.energy.measure` reads deformations and their rates with."""
     rows = np.repeat(np.asarray(joint, PARAM), 3)
-    for name in ("cross", "fork"):
-        rows[f"k_{name}"][1], rows[f"c_{name}"][1] = 1.0, 0.0
-        rows[f"k_{name}"][2], rows[f"c_{name}"][2] = 0.0, 1.0
+    rows["k"][1], rows["c"][1] = 1.0, 0.0
+    rows["k"][2], rows["c"][2] = 0.0, 1.0
     rows["c_d"][1] = 0.0
     return rows.view(np.recarray)

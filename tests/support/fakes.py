@@ -20,22 +20,12 @@ import numpy as np
 import pytest
 
 from tests.support.environment import environment as environment
+from tests.support.of_cardan import ERROR, ERROR_FIELDS, PARAM, RESULT, RESULT_FIELDS, kept_columns
 from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
-from tolstat.common.columns import KEPT, Column, kept_columns
+from tolstat.common.columns import KEPT, Column
 from tolstat.common.counts import Counts
-from tolstat.common.tables import (
-    DESIGN,
-    ERROR,
-    ERROR_FIELDS,
-    PARAM,
-    RESULT,
-    RESULT_FIELDS,
-    HistorySpec,
-    Options,
-    Simulation,
-    Status,
-)
+from tolstat.common.tables import DESIGN, HistorySpec, Options, Simulation, Status
 from tolstat.joint import Operation
 from tolstat.joint.model import leaves
 from tolstat.solver import stationary
@@ -189,7 +179,7 @@ def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
 
 def perturb(joint: Any, operation: Operation, errors: np.ndarray) -> np.ndarray:
     params = np.zeros(len(errors), PARAM)
-    params["alpha"] = operation.alpha + errors["operation.alpha"]
+    params["alpha"][:, 0] = operation.alpha + errors["operation.alpha"]
     params["R"] = errors["pin1.offset_t"]
     return params
 
@@ -208,7 +198,7 @@ def simulate(
     """Simulate joints by a formula, `seconds` each; one in ten fails, one in ten does not settle."""
     time.sleep(seconds * len(params))
     results = np.zeros(len(params), RESULT)
-    x = params["R"] + 2 * params["alpha"]
+    x = params["R"] + 2 * params["alpha"][:, 0]
     results["status"] = np.where(x > 3, Status.NEWTON_FAILED, np.where(x < -3, Status.NOT_SETTLED, Status.OK))
     results["settled"] = results["status"] == Status.OK
     results["steps"] = options.steps_per_rev

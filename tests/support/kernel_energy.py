@@ -14,17 +14,19 @@ no damper, a third dampers of 1 and no spring.
 
 import math
 
+from tests.support.mechanisms import PSI, S, body
 from tolstat.common.fields import Field, dtype_of
 from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.dynamics import forces, mass_of, resisting_torque
-from tolstat.kernel.mechanics.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, INPUT_SHAFT, N_LUMPS, PSI, S
 from tolstat.kernel.mechanics.triad import to_triad
 from tolstat.kernel.mechanics.vector import add, cross, dot, row, sub, turn_back
 from tolstat.kernel.mechanics.work import DELTA, FORCE, V_NORMAL, V_TANGENT
 from tolstat.kernel.simd.jit import njit
 
+INPUT, OUTPUT = body("input"), body("output")
+"""Numbers of the shafts."""
 ENERGY_FIELDS = (
     Field("kinetic", "J", "kinetic energy of the lumps and the output shaft, absolute motion"),
     Field("bushings", "J", "elastic energy of the 8 bushings"),
@@ -43,14 +45,20 @@ ENERGY = dtype_of(ENERGY_FIELDS)
 
 
 @njit
+def output_speed(v, par, work):
+    """Angular velocity of the output shaft, rad/s."""
+    return work.frame_w[par.frame[OUTPUT], 2] + v[PSI]
+
+
+@njit
 def kinetic_energy(v, par, work):
     """Kinetic energy of the lumps and the output shaft in the ground frame, J."""
-    energy = 0.5 * par.Js * (work.shaft[0] + v[PSI]) ** 2 + 0.5 * par.slides * par.m_s * v[S] ** 2
-    for body in range(N_LUMPS):
-        mass, inertia = mass_of(body, par)
-        omega = row(work.frame_w, FRAME[body])
-        velocity = add(row(work.vel, body), cross(omega, row(work.pos, body)))
-        w = to_triad(body, turn_back(work.rot, body, add(omega, row(work.spin, body))))
+    energy = 0.5 * par.Js[0] * output_speed(v, par, work) ** 2 + 0.5 * par.slides * par.m_s * v[S] ** 2
+    for lump in range(par.lump_kind.shape[0]):
+        mass, inertia = mass_of(lump, par)
+        omega = row(work.frame_w, par.frame[lump])
+        velocity = add(row(work.vel, lump), cross(omega, row(work.pos, lump)))
+        w = to_triad(lump, turn_back(work.rot, lump, add(omega, row(work.spin, lump))), par)
         energy += 0.5 * mass * dot(velocity, velocity)
         for k in range(3):
             energy += 0.5 * inertia[k] * w[k] ** 2
@@ -60,9 +68,9 @@ def kinetic_energy(v, par, work):
 @njit
 def bushing_energy(i, par, springs, dampers, work, out):
     """Add the elastic energy and the powers of bushing `i`."""
-    base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
-    stiffness, damping = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
-    w = to_triad(lump, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))))
+    base, lump, kind = par.bushing_base[i], par.bushing_lump[i], par.bushing_kind[i]
+    stiffness, damping = par.k[kind], par.c[kind]
+    w = to_triad(lump, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))), par)
     bushing_load(i, springs, work)
     elastic_moment = (work.load[i, 3], work.load[i, 4], work.load[i, 5])
     for k in range(6):
@@ -111,7 +119,7 @@ def measure(t, q, v, rows, options, work, out):
     ----------
     t : float
         Time, s.
-    q, v : ndarray, shape (56,)
+    q, v : ndarray, shape (dof,)
         Unknowns and their rates; m and rad.
     rows : ndarray of PARAM, shape (3,)
         The joint; the same with bushing stiffness 1, no bushing damping and no contact damping; the same with bushing
@@ -126,20 +134,20 @@ def measure(t, q, v, rows, options, work, out):
     par = rows[0]
     forces(t, q, v, par, work)
     out.kinetic = kinetic_energy(v, par, work)
-    out.input = -work.force[INPUT_SHAFT, 5] * work.drive[0]
-    out.load = resisting_torque(t, par, work, options.start == RAMP) * (work.shaft[0] + v[PSI])
+    out.input = -work.force[INPUT, 5] * work.drive[0]
+    out.load = resisting_torque(t, par, work, options.start == RAMP) * output_speed(v, par, work)
     out.support, out.axial = 0.5 * par.slides * par.k_a * q[S] ** 2, par.slides * par.F_a * v[S]
     out.support_damping = par.slides * par.c_a * v[S] ** 2
     out.bushings = out.contacts = 0.0
     out.bushing_damping = out.contact_damping = out.film = out.bushing_moments = 0.0
-    for pin in range(4):
+    for pin in range(par.pin.shape[0]):
         contact_energy(pin, par, rows[1], work, out)
-    for i in range(8):
+    for i in range(par.bushing_lump.shape[0]):
         bushing_energy(i, par, rows[1], rows[2], work, out)
 
 
 @njit
 def measure_all(t, points, rows, options, work, out):
-    """`measure` every state of a trajectory: ``points``, shape (n, 3, 56), at times `t`, to `out`, shape (n,)."""
+    """`measure` every state of a trajectory: ``points``, shape (n, 3, dof), at times `t`, to `out`, shape (n,)."""
     for k in range(t.size):
         measure(t[k], points[k, 0], points[k, 1], rows, options, work, out[k])

@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.precision.measuring import parameters
-from tolstat.common.tables import RESULT, Fidelity, Method, Options
+from tests.support.of_cardan import RESULT, for_kernels
+from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import Fidelity, Method, Options
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:
@@ -59,7 +62,7 @@ class Snapshot(NamedTuple):
         The joint.
     t, cv, ca : float
         Time, s; derivatives of velocity and acceleration by the unknowns in a step, 1/s and 1/s^2.
-    q, v, a : ndarray, shape (56,)
+    q, v, a : ndarray, shape (dof,)
         Unknowns and derivatives; m, rad and s.
     """
 
@@ -107,23 +110,33 @@ def tally(these: Sample) -> NDArray[np.int64]:
 
     params, options = these
     left, samples = np.full(len(params), UNLIMITED), make_samples(0, options.steps_per_rev)
-    return simulation.run_lanes(simulation.make_queue(params, options, left, samples, simulation.NO_BLOCKS), options)
+    none = for_kernels(simulation.blank_results((0, 0), CARDAN))
+    return simulation.run_lanes(simulation.make_queue(params, options, left, samples, none), options)
 
 
-def dense(work: np.record) -> NDArray[np.float64]:
-    """Tangent as one matrix, (56, 56): the blocks of `work` after assembly and before elimination."""
-    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, N_LUMPS, PIN, PSI, S
-    from tolstat.kernel.mechanics.work import ARM_PIN, OF_PSI, OF_S, PIN_HUB
+def dense(work: np.record, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
+    """Tangent as one matrix, (dof, dof): the blocks of `work` after assembly and before elimination."""
+    lumps, shafts = len(mechanism.lumps), 6 * len(mechanism.lumps)
+    s, m, body = np.zeros((mechanism.dof, mechanism.dof)), work.block, mechanism.bodies.index
 
-    s = np.zeros((N_DOF, N_DOF))
-    m, e = work.block, work.edge
-    for body in range(N_LUMPS):
-        s[6 * body : 6 * body + 6, 6 * body : 6 * body + 6] = m[body]
-    for p in range(4):
-        pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
-        s[:6, pin : pin + 6] = m[PIN_HUB + p].T
-        s[pin : pin + 6, arm : arm + 6] = m[ARM_PIN + p].T
-    for body in (ARM + 2, ARM + 3):  # output fork
-        s[6 * body : 6 * body + 6, PSI], s[6 * body : 6 * body + 6, S] = e[OF_PSI, body], e[OF_S, body]
-    s[PSI : S + 1, PSI : S + 1] = work.corner
-    return np.triu(s) + np.triu(s, 1).T
+    def rows(name: str) -> slice:
+        return slice(6 * body(name), 6 * body(name) + 6)
+
+    def put(first: slice, second: slice, block: NDArray[np.float64]) -> None:
+        s[first, second], s[second, first] = block, block.T
+
+    for lump, block in zip(mechanism.lumps, m, strict=False):
+        s[rows(lump.name), rows(lump.name)] = np.triu(block) + np.triu(block, 1).T
+    for pair, block in zip(mechanism.pairs, m[lumps:], strict=False):
+        put(rows(pair.hole), rows(pair.pin), block)
+    held = [bushing for bushing in mechanism.bushings if body(bushing.base) < lumps]
+    for bushing, block in zip(held, m[lumps + len(mechanism.pairs) :], strict=False):
+        put(rows(bushing.lump), rows(bushing.base), block)
+    for bushing in mechanism.bushings:
+        for shaft in mechanism.shafts:
+            for name in {shaft.turns, shaft.slides} & {*mechanism.unknowns}:
+                if shaft.name == bushing.base:
+                    u = mechanism.unknowns.index(name)
+                    put(rows(bushing.lump), slice(shafts + u, shafts + u + 1), work.edge[u, [body(bushing.lump)]].T)
+    s[shafts:, shafts:] = np.triu(work.corner) + np.triu(work.corner, 1).T
+    return s

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tolstat.common.load_kinds import SPAN
+from tests.support.of_cardan import SPAN
 
 
 def largest_loads(force, torque, contact, psi):

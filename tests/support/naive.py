@@ -1,32 +1,54 @@
-"""The joint once more, slowly and plainly: world coordinates, NumPy, one statement for each sentence of the model.
+"""A mechanism once more, slowly and plainly: world coordinates, NumPy, one statement for each sentence of the model.
 
-Twin of ``kernel.mechanics.dynamics``: it shares no code with the kernel but the table of parameters. Velocities and
-accelerations of bodies come from differences of their world position and attitude in time, so that none of the
-kernel's inertial terms is written a second time.
+Twin of ``kernel.mechanics.dynamics``: it shares no code with the kernel but the table of parameters and the description
+of the mechanism, which it reads by name. Velocities and accelerations of bodies come from differences of their world
+position and attitude in time, or `follow` integrates them, so that none of the kernel's inertial terms is written a
+second time. The world of a body is that of the Cardan joint that it is part of: z along the input side, the plane of
+the joint x-z.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-PIN_AXES = {1: (0, 1), 2: (0, -1), 3: (1, 0), 4: (-1, 0)}
-ARM_AXES = {1: (1, 0), 2: (-1, 0), 3: (0, -1), 4: (0, 1)}
-ARM_OF_PIN = {1: 4, 2: 3, 3: 1, 4: 2}
+from tests.support.mechanisms import triads
+from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import DRIVEN, HELD
+
 Z = np.array([0.0, 0.0, 1.0])
+NODES = np.arange(-4, 5)
+FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
+"""Weights of central differences over nine points, for the first and second derivative."""
 
 
 def turn(axis, angle):
     return Rotation.from_rotvec(angle * np.array(axis, float)).as_matrix()
 
 
-def frames(theta, alpha):
-    """Attitudes of I, C and F."""
+def joint_frames(theta, alpha):
+    """Attitudes of input, cross and output of one Cardan joint."""
     beta = np.arctan(np.tan(alpha) * np.sin(theta))
     gamma = np.arcsin(np.sin(alpha) * np.cos(theta))
     i = turn(Z, theta)
     c = i @ turn((1, 0, 0), beta)
     return i, c, c @ turn((0, 1, 0), gamma)
+
+
+def frames(theta, par, mechanism=CARDAN):
+    """Attitudes of the members, (n, 3, 3), where the input is at `theta`."""
+    found = [turn(Z, {HELD: 0.0, DRIVEN: theta}.get(member.motion, np.nan)) for member in mechanism.members]
+    names = [member.name for member in mechanism.members]
+    for name, alpha, ahead in zip(mechanism.cardan, par.alpha, par.ahead, strict=True):
+        first, theta = names.index(name), theta + ahead
+        found[first : first + 3] = joint_frames(theta, alpha)
+        output = turn((0, -1, 0), alpha) @ found[first + 2]
+        theta = np.arctan2(output[1, 0], output[0, 0])
+    return np.array(found)
 
 
 def input_angle(phase, par):
@@ -41,38 +63,70 @@ def resisting_torque(phase, par):
     return par.torque + sum(cosine * np.cos(x) + sine * np.sin(x) for x, (cosine, sine) in waves)
 
 
-def triad(axes):
-    e = np.array([*axes, 0.0])
-    return np.array([e, np.cross(Z, e), Z])
+def ideal_attitudes(t, par, mechanism):
+    """Attitudes of the ideal frames of all bodies at one time, lumps before shafts, (bodies, 3, 3)."""
+    names = [member.name for member in mechanism.members]
+    of = [names.index(part.member) for part in (*mechanism.lumps, *mechanism.shafts)]
+    return frames(input_angle(par.omega * t, par), par, mechanism)[of]
 
 
-class Bodies:
-    """World position of reference points and attitude of all bodies at one time."""
-
-    def __init__(self, t, q, par):
-        i, c, f = frames(input_angle(par.omega * t, par), par.alpha)
-        self.position, self.attitude = {}, {}
-        names = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
-        for k, name in enumerate(names):
-            number = int(name[-1]) if name != "hub" else 0
-            frame = c if k < 5 else (i if number < 3 else f)
-            e = np.zeros(3) if k == 0 else triad((PIN_AXES if k < 5 else ARM_AXES)[number])[0]
-            u, phi = q[6 * k : 6 * k + 3], q[6 * k + 3 : 6 * k + 6]
-            self.position[name] = frame @ (par.R * e + u)
-            self.attitude[name] = frame @ Rotation.from_rotvec(phi).as_matrix()
-        self.position["in"], self.position["out"] = np.zeros(3), f @ (par.slides * q[55] * Z)
-        self.attitude["in"], self.attitude["out"] = i, f @ turn(Z, q[54])
+def places(par, mechanism):
+    """Reference points of the lumps in axes of their members, (lumps, 3)."""
+    kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
+    return np.einsum("ba,bak->bk", par.at[kinds], triads(mechanism))
 
 
-def motion(t, q, v, a, par, h=1e-6):
-    """Positions, attitudes, velocities and accelerations by central differences along q + v s + a s^2 / 2."""
-    before, now, after = (Bodies(t + s, q + v * s + a * s * s / 2, par) for s in (-h, 0.0, h))
-    velocity, spin = {}, {}
-    for name in now.position:
-        velocity[name] = (after.position[name] - before.position[name]) / (2 * h)
-        step = Rotation.from_matrix(after.attitude[name] @ before.attitude[name].T).as_rotvec()
-        spin[name] = step / (2 * h)
-    return now, velocity, spin
+def of_shafts(values, par, mechanism):
+    """Rotation about z and displacement along it of each shaft by the unknowns `values` of shafts, (shafts, 2)."""
+    value = dict(zip(mechanism.unknowns, values, strict=True)) | {"": 0.0}
+    return np.array([(value[shaft.turns], par.slides * value[shaft.slides]) for shaft in mechanism.shafts])
+
+
+class Bodies(NamedTuple):
+    """World position of reference points, (n, 3), and attitude, (n, 3, 3), of all bodies, lumps before shafts."""
+
+    position: np.ndarray
+    attitude: np.ndarray
+
+
+def bodies(t, q, par, mechanism=CARDAN):
+    """Bodies at one time; `q`: deviations, (dof,)."""
+    lumps = len(mechanism.lumps)
+    ideal = ideal_attitudes(t, par, mechanism)
+    of_lumps, shafts = q[: 6 * lumps].reshape(lumps, 6), of_shafts(q[6 * lumps :], par, mechanism)
+    inside = np.concatenate([places(par, mechanism) + of_lumps[:, :3], shafts[:, 1:] * Z])
+    vectors = np.concatenate([of_lumps[:, 3:], shafts[:, :1] * Z])
+    return Bodies(np.einsum("bij,bj->bi", ideal, inside), ideal @ Rotation.from_rotvec(vectors).as_matrix())
+
+
+class Motion(NamedTuple):
+    """Bodies, their velocities and angular velocities, and the derivatives of these; all (n, 3)."""
+
+    bodies: Bodies
+    velocity: np.ndarray
+    spin: np.ndarray
+    acceleration: np.ndarray
+    spin_rate: np.ndarray
+
+
+def vee(matrices):
+    """Vectors of the skew parts of matrices, (n, 3)."""
+    skew = 0.5 * (matrices - matrices.swapaxes(1, 2))
+    return np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+
+
+def motion(t, q, v, a, par, mechanism=CARDAN, h=2e-6):
+    """Motion by central differences along q + v s + a s^2 / 2.
+
+    The second derivative of an attitude times its transpose has the angular acceleration as skew part.
+    """
+    at = [bodies(t + s, q + v * s + a * s * s / 2, par, mechanism) for s in h * NODES]
+    position, attitude = (np.array([getattr(one, name) for one in at]) for name in Bodies._fields)
+    back = attitude[4].swapaxes(1, 2)
+    spin = vee(np.tensordot(FIRST, attitude, 1) @ back) / h
+    spin_rate = vee(np.tensordot(SECOND, attitude, 1) @ back) / h**2
+    velocity, acceleration = np.tensordot(FIRST, position, 1) / h, np.tensordot(SECOND, position, 1) / h**2
+    return Motion(at[4], velocity, spin, acceleration, spin_rate)
 
 
 def smooth_step(x):
@@ -89,25 +143,24 @@ def contact_mode(stations):
     return "TWO_POINT" if sides[0] @ sides[1] < 0 else "UNIFORM"
 
 
-def stations_of(p, body, velocity, spin, par):
-    """Stations of pin p that touch its hole or not: point, normal, penetration, pressing force, force on the pin."""
-    pin, arm = f"pin{p}", f"arm{ARM_OF_PIN[p]}"
-    a_pin, a_arm = body.attitude[pin], body.attitude[arm]
-    centre = body.position[arm] + a_arm @ par.hole_point[ARM_OF_PIN[p] - 1]
-    axis = a_arm @ par.hole_axis[ARM_OF_PIN[p] - 1]
+def stations_of(p, now, par, mechanism):
+    """Stations of the pin of pair p that touch its hole or not: point, normal, penetration, pressing force, force."""
+    pin, hole = (mechanism.bodies.index(name) for name in (mechanism.pairs[p].pin, mechanism.pairs[p].hole))
+    position, attitude = now.bodies
+    centre = position[hole] + attitude[hole] @ par.hole_point[p]
+    axis = attitude[hole] @ par.hole_axis[p]
     stations = []
     for j in range(par.n_stations):
-        point = body.position[pin] + a_pin @ (par.pin_point[p - 1] + par.station_s[j] * par.pin_axis[p - 1])
+        point = position[pin] + attitude[pin] @ (par.pin_point[p] + par.station_s[j] * par.pin_axis[p])
         d = point - centre
         g = d - (d @ axis) * axis
-        n, delta = g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1]
+        n, delta = g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p]
         if delta <= 0:
             stations.append((point, n, delta, 0.0, np.zeros(3)))
             continue
-        slip = velocity[pin] + np.cross(spin[pin], point - body.position[pin])
-        slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
+        slip = velocity_at(point, pin, now) - velocity_at(point, hole, now)
         elastic = par.station_k1[j] * delta**2 + par.station_k2[j] * delta
-        elastic += par.station_k3[j] * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p - 1])
+        elastic += par.station_k3[j] * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p])
         ramp = par.station_weight[j] * smooth_step(delta / par.delta_d)
         pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
         tangential = slip - (slip @ n) * n - (slip @ axis) * axis
@@ -115,105 +168,219 @@ def stations_of(p, body, velocity, spin, par):
     return stations
 
 
-def contacts(t, q, v, par):
-    """Contact forces of each pin, (4, 3): of its outermost station, of its innermost one, resultant of all."""
-    motions = motion(t, q, v, np.zeros(56), par)
-    found = np.zeros((4, 3))
-    for p in (1, 2, 3, 4):
-        stations = stations_of(p, *motions, par)
+def velocity_at(point, body, now):
+    """Velocity of a point that moves with a body."""
+    return now.velocity[body] + np.cross(now.spin[body], point - now.bodies.position[body])
+
+
+def contacts(t, q, v, par, mechanism=CARDAN):
+    """Contact forces of each pin, (pairs, 3): of its outermost station, of its innermost one, resultant of all."""
+    now = motion(t, q, v, 0 * q, par, mechanism)
+    found = []
+    for p in range(len(mechanism.pairs)):
+        stations = stations_of(p, now, par, mechanism)
         total = np.linalg.norm(sum(f for *_, f in stations))
-        found[p - 1] = stations[0][3], stations[-1][3], total
+        found.append((stations[0][3], stations[-1][3], total))
+    return np.array(found)
+
+
+def vector_rate(relative, spin):
+    """Rate of the rotation vector of an attitude that turns with `spin`, all in axes of the base, by short turns."""
+    h = 1e-3
+    turned = Rotation.from_rotvec(h * np.multiply.outer(NODES, spin / max(1.0, np.linalg.norm(spin)))).as_matrix()
+    vectors = Rotation.from_matrix(turned @ relative).as_rotvec()
+    return max(1.0, np.linalg.norm(spin)) * (FIRST @ vectors) / h
+
+
+class Loads(NamedTuple):
+    """Forces between bodies.
+
+    Attributes
+    ----------
+    force : ndarray, shape (bodies, 6)
+        World force and torque about the reference point.
+    bushing : ndarray, shape (bushings, 6)
+        On the lump, along its triad in the base.
+    modes : list of str
+        Contact mode of each pin.
+    """
+
+    force: np.ndarray
+    bushing: np.ndarray
+    modes: list[str]
+
+
+def forces(t, q, v, par, mechanism=CARDAN):
+    """Loads at a state."""
+    return loads_between(motion(t, q, v, 0 * q, par, mechanism), par, mechanism)
+
+
+def loads_between(now, par, mechanism):
+    """Loads of bodies that move as `now` says."""
+    position, attitude = now.bodies
+    force, loads, modes = np.zeros((len(mechanism.bodies), 6)), [], []
+
+    def apply(body, f, torque, point):
+        force[body] += np.concatenate([f, torque + np.cross(point - position[body], f)])
+
+    for bushing in mechanism.bushings:
+        lump, base = (mechanism.bodies.index(name) for name in (bushing.lump, bushing.base))
+        kind, local = mechanism.bushing_kinds.index(bushing.kind), triads(mechanism)[lump]
+        on_lump, on_base = par.marker[kind] @ local
+        marker = position[lump] + attitude[lump] @ on_lump
+        to_marker = local @ attitude[base].T
+        x = to_marker @ (marker - position[base] - attitude[base] @ on_base)
+        moving = velocity_at(marker, lump, now) - velocity_at(marker, base, now)
+        relative = attitude[base].T @ attitude[lump]
+        phi = Rotation.from_matrix(relative).as_rotvec()
+        rate = vector_rate(relative, attitude[base].T @ (now.spin[lump] - now.spin[base]))
+        load = -par.k[kind] * np.concatenate([x, local @ phi])
+        load -= par.c[kind] * np.concatenate([to_marker @ moving, local @ rate])
+        f, torque = to_marker.T @ load[:3], to_marker.T @ load[3:]
+        apply(lump, f, torque, marker)
+        apply(base, -f, -torque, marker)
+        loads.append(load)
+
+    for p, pair in enumerate(mechanism.pairs):
+        stations = stations_of(p, now, par, mechanism)
+        modes.append(contact_mode([(n, delta) for _, n, delta, _, _ in stations]))
+        for point, _, _, _, f in stations:
+            apply(mechanism.bodies.index(pair.pin), f, np.zeros(3), point)
+            apply(mechanism.bodies.index(pair.hole), -f, np.zeros(3), point)
+    return Loads(force, np.array(loads), modes)
+
+
+def inertias(attitude, par, mechanism):
+    """Mass, (n,), and inertia in world axes, (n, 3, 3), of each lump."""
+    kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
+    axes = attitude[: len(kinds)] @ triads(mechanism).swapaxes(1, 2)
+    return par.mass[kinds], np.einsum("bij,bj,bkj->bik", axes, par.inertia[kinds], axes)
+
+
+def on_shafts(t, force, q, v, par, mechanism):
+    """Torque or force that accelerates each unknown of shafts, its ideal acceleration apart, and its inertia."""
+    axes = ideal_attitudes(t, par, mechanism)[len(mechanism.lumps) :] @ Z
+    own = force[len(mechanism.lumps) :]
+    found = []
+    for u, name in enumerate(mechanism.unknowns):
+        i = 6 * len(mechanism.lumps) + u
+        turning = [k for k, shaft in enumerate(mechanism.shafts) if shaft.turns == name]
+        sliding = [k for k, shaft in enumerate(mechanism.shafts) if shaft.slides == name]
+        total = sum(own[k, 3:] @ axes[k] for k in turning) + sum(own[k, :3] @ axes[k] for k in sliding)
+        if sliding:
+            total += par.F_a - par.k_a * par.slides * q[i] - par.c_a * par.slides * v[i]
+        elif name == mechanism.rotations[-1]:
+            total -= resisting_torque(par.omega * t, par)
+        found.append((total, par.m_s if sliding else par.Js[u]))
     return found
 
 
-def forces(t, q, v, par):
-    """World force and torque about the reference point of every body, loads of the bushings, contact modes."""
-    body, velocity, spin = motion(t, q, v, np.zeros(56), par)
-    force = {name: np.zeros(6) for name in body.position}
-    loads = np.zeros((8, 6))
-    modes: list[str] = []
-
-    def apply(name, f, torque, point):
-        force[name] += np.concatenate([f, torque + np.cross(point - body.position[name], f)])
-
-    for k in range(8):
-        number = k % 4 + 1
-        if k < 4:
-            lump, base, local = f"pin{number}", "hub", triad(PIN_AXES[number])
-            on_base = par.r_b * local[0]
-            on_lump = (par.r_b - par.R) * local[0]
-            stiffness, damping = par.k_cross, par.c_cross
-        else:
-            lump, base, local = f"arm{number}", "in" if number < 3 else "out", triad(ARM_AXES[number])
-            lever = (-par.l_f if number < 3 else par.l_f) * Z
-            on_base, on_lump = par.R * local[0] + lever, lever
-            stiffness, damping = par.k_fork, par.c_fork
-        a_base, a_lump = body.attitude[base], body.attitude[lump]
-        marker = body.position[lump] + a_lump @ on_lump
-        to_marker = local @ a_base.T
-        x = to_marker @ (marker - body.position[base] - a_base @ on_base)
-        moving = velocity[lump] + np.cross(spin[lump], marker - body.position[lump])
-        moving = moving - velocity[base] - np.cross(spin[base], marker - body.position[base])
-        phi = Rotation.from_matrix(a_base.T @ a_lump).as_rotvec()
-        # rate of the rotation vector, by a short turn
-        h = 1e-7
-        relative = a_base.T @ (spin[lump] - spin[base])
-        turned = Rotation.from_matrix(Rotation.from_rotvec(relative * h).as_matrix() @ a_base.T @ a_lump)
-        turned_back = Rotation.from_matrix(Rotation.from_rotvec(-relative * h).as_matrix() @ a_base.T @ a_lump)
-        rate = (turned.as_rotvec() - turned_back.as_rotvec()) / (2 * h)
-        loads[k] = -stiffness * np.concatenate([x, local @ phi])
-        loads[k] -= damping * np.concatenate([to_marker @ moving, local @ rate])
-        f, torque = to_marker.T @ loads[k, :3], to_marker.T @ loads[k, 3:]
-        apply(lump, f, torque, marker)
-        apply(base, -f, -torque, marker)
-
-    for p in (1, 2, 3, 4):
-        pin, arm = f"pin{p}", f"arm{ARM_OF_PIN[p]}"
-        stations = stations_of(p, body, velocity, spin, par)
-        modes.append(contact_mode([(n, delta) for _, n, delta, _, _ in stations]))
-        for point, _, _, _, f in stations:
-            apply(pin, f, np.zeros(3), point)
-            apply(arm, -f, np.zeros(3), point)
-    return force, loads, modes
-
-
-def imbalance(t, q, v, a, par):
-    """World momentum rates less forces and torques of every lump, and of the shaft about and along its axis."""
-    force, _, _ = forces(t, q, v, par)
-    h = 1e-6
-    lumps = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
-    momentum = []
-    for s in (-h, h):
-        body, velocity, spin = motion(t + s, q + v * s + a * s * s / 2, v + a * s, a, par)
-        momentum.append((body.position, velocity, spin, body.attitude))
+def imbalance(t, q, v, a, par, mechanism=CARDAN):
+    """World momentum rates less forces and torques of every lump, and of shafts about and along their axes, by name."""
+    now, lumps = motion(t, q, v, a, par, mechanism), len(mechanism.lumps)
+    force = loads_between(now, par, mechanism).force
+    mass, inertia = inertias(now.bodies.attitude, par, mechanism)
     off = {}
-    for name in lumps:
-        if name == "hub":
-            mass, inertia, local = par.hub_mass, par.hub_inertia, np.eye(3)
-        else:
-            pin = name.startswith("pin")
-            mass = par.pin_mass if pin else par.arm_mass
-            inertia = par.pin_inertia if pin else par.arm_inertia
-            local = triad((PIN_AXES if pin else ARM_AXES)[int(name[-1])])
-        linear, angular = [], []
-        for _, velocity, spin, attitudes in momentum:
-            attitude = attitudes[name] @ local.T
-            linear.append(mass * velocity[name])
-            angular.append(attitude @ (inertia * (attitude.T @ spin[name])))
-        off[name] = np.concatenate(
+    for b, lump in enumerate(mechanism.lumps):
+        torque = inertia[b] @ now.spin_rate[b] + np.cross(now.spin[b], inertia[b] @ now.spin[b])
+        off[lump.name] = np.concatenate([mass[b] * now.acceleration[b], torque]) - force[b]
+    axes = ideal_attitudes(t, par, mechanism)[lumps:] @ Z
+    of_unknowns = on_shafts(t, force, q, v, par, mechanism)
+    for name, (total, own_inertia) in zip(mechanism.unknowns, of_unknowns, strict=True):
+        for k, shaft in enumerate(mechanism.shafts):
+            if shaft.turns == name:
+                off[name] = own_inertia * now.spin_rate[lumps + k] @ axes[k] - total
+            if shaft.slides == name and par.slides:
+                off[name] = own_inertia * now.acceleration[lumps + k] @ axes[k] - total
+    return off
+
+
+class World:
+    """Unknowns of a mechanism in world coordinates: of each lump place, quaternion, velocity, spin; of shafts q, v."""
+
+    def __init__(self, par, mechanism=CARDAN):
+        self.par, self.mechanism, self.lumps = par, mechanism, len(mechanism.lumps)
+
+    def pack(self, position, quaternion, velocity, spin, shafts):
+        """One vector of all."""
+        return np.concatenate([np.hstack([position, quaternion, velocity, spin]).ravel(), np.ravel(shafts)])
+
+    def unpack(self, y):
+        """What `pack` takes; of shafts values and rates."""
+        of_lumps = y[: 13 * self.lumps].reshape(self.lumps, 13)
+        return (*np.split(of_lumps, [3, 7, 10], axis=1), y[13 * self.lumps :].reshape(2, -1))
+
+    def state(self, t, q, v):
+        """Deviations and their rates, in world coordinates."""
+        now, n = motion(t, q, v, 0 * q, self.par, self.mechanism), self.lumps
+        quaternion = Rotation.from_matrix(now.bodies.attitude[:n]).as_quat()
+        of_shafts = q[6 * n :], v[6 * n :]
+        return self.pack(now.bodies.position[:n], quaternion, now.velocity[:n], now.spin[:n], of_shafts)
+
+    def deviations(self, t, y):
+        """Deviations q of a state in world coordinates."""
+        position, quaternion, _, _, shafts = self.unpack(y)
+        back = ideal_attitudes(t, self.par, self.mechanism)[: self.lumps].swapaxes(1, 2)
+        u = np.einsum("bij,bj->bi", back, position) - places(self.par, self.mechanism)
+        phi = Rotation.from_matrix(back @ Rotation.from_quat(quaternion).as_matrix()).as_rotvec()
+        return np.concatenate([np.hstack([u, phi]).ravel(), shafts[0]])
+
+    def rate(self, t, y):
+        """Derivative of a state in world coordinates: Newton and Euler of each lump; shafts turn and slide."""
+        position, quaternion, velocity, spin, (value, speed) = self.unpack(y)
+        par, mechanism, n = self.par, self.mechanism, self.lumps
+        q, v = (np.concatenate([np.zeros(6 * n), own]) for own in (value, speed))
+        ideal = motion(t, q, v, 0 * q, par, mechanism)
+        attitude = Rotation.from_quat(quaternion).as_matrix()
+        now = Motion(
+            Bodies(
+                np.concatenate([position, ideal.bodies.position[n:]]),
+                np.concatenate([attitude, ideal.bodies.attitude[n:]]),
+            ),
+            np.concatenate([velocity, ideal.velocity[n:]]),
+            np.concatenate([spin, ideal.spin[n:]]),
+            np.zeros(0),
+            np.zeros(0),
+        )
+        force = loads_between(now, par, mechanism).force
+        mass, inertia = inertias(now.bodies.attitude, par, mechanism)
+        momentum = np.einsum("bij,bj->bi", inertia, spin)
+        faster = np.linalg.solve(inertia, (force[:n, 3:] - np.cross(spin, momentum))[..., None])[..., 0]
+        turned = 0.5 * np.hstack(
             [
-                (linear[1] - linear[0]) / (2 * h) - force[name][:3],
-                (angular[1] - angular[0]) / (2 * h) - force[name][3:],
+                quaternion[:, 3:] * spin + np.cross(spin, quaternion[:, :3]),
+                -(quaternion[:, :3] * spin).sum(axis=1, keepdims=True),
             ]
         )
-    shaft = np.array([np.sin(par.alpha), 0, np.cos(par.alpha)])
-    rate = (momentum[1][2]["out"] - momentum[0][2]["out"]) @ shaft / (2 * h)
-    off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting_torque(par.omega * t, par)
-    if par.slides:
-        place, speed = (np.array([of[k]["out"] @ shaft for of in momentum]) for k in (0, 1))
-        support = par.k_a * place.mean() + par.c_a * speed.mean()
-        off["axial"] = par.m_s * np.diff(speed)[0] / (2 * h) - force["out"][:3] @ shaft - par.F_a + support
-    return off
+        return self.pack(
+            velocity, turned, force[:n, :3] / mass[:, None], faster, (speed, self._of_shafts(t, force, q, v, ideal))
+        )
+
+    def _of_shafts(self, t, force, q, v, ideal):
+        """Second derivatives of the unknowns of shafts; `ideal`: motion without them."""
+        axes = ideal_attitudes(t, self.par, self.mechanism)[self.lumps :] @ Z
+        found = []
+        for name, (total, inertia) in zip(
+            self.mechanism.unknowns, on_shafts(t, force, q, v, self.par, self.mechanism), strict=True
+        ):
+            change = 0.0
+            for k, shaft in enumerate(self.mechanism.shafts):
+                if shaft.turns == name:
+                    change = ideal.spin_rate[self.lumps + k] @ axes[k]
+                if shaft.slides == name and not self.par.slides:
+                    total, inertia = 0.0, 1.0
+            found.append(total / inertia - change)
+        return np.array(found)
+
+
+def follow(t, q, v, end, par, mechanism=CARDAN, rtol=1e-7):
+    """Deviations q at the times `end`, (n, dof), of a motion from q, v at `t` on: Radau's method, world coordinates."""
+    world = World(par, mechanism)
+    ones, n = np.ones((world.lumps, 3)), len(mechanism.unknowns)
+    sizes = world.pack(1e-2 * ones, np.ones((world.lumps, 4)), ones, 1e2 * ones, np.repeat([[1.0], [1e2]], n, axis=1))
+    found = solve_ivp(world.rate, (t, end[-1]), world.state(t, q, v), "Radau", end, rtol=rtol, atol=1e-2 * rtol * sizes)
+    assert found.success, found.message
+    return np.array([world.deviations(*at) for at in zip(found.t, found.y.T, strict=True)])
 
 
 def turns(signal):

@@ -131,12 +131,12 @@ def newton(t, cv, ca, par, options, work, state):
         if fresh:
             state.memory[CV_FACTORISED] = cv
             assemble(cv, ca, cv, par, work)
-            if not eliminate(work):
+            if not eliminate(par, work):
                 break
         before = now
         for i in range(q.size):
             work.solution[i] = -state.residual[i]
-        solve(q, work)
+        solve(q, par, work)
         for i in range(q.size):
             change = work.solution[i]
             q[i] += change

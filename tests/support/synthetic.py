@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tolstat.common.load_kinds import JOINT, LOAD_KINDS
-from tolstat.common.tables import ERROR, RESULT, Status
+from tests.support.of_cardan import ERROR, LOAD_KINDS, RESULT
+from tolstat.common.load_kinds import JOINT
+from tolstat.common.tables import Status
 from tolstat.solver import stationary
 
 BASE = {

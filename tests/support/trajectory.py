@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.support.mechanisms import N_DOF
 from tests.support.stepping import State, advance, make_state, reset
 from tolstat.common.tables import Options, Start, Status
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.outcome import inside_model
 from tolstat.kernel.revolution.settle import grid_step
@@ -19,7 +19,7 @@ from tolstat.solver import simulation
 
 @njit
 def march(par, options, work, state, points):
-    """Take steps of the output grid; write q, v, a of each point reached to `points`, (steps + 1, 3, 56)."""
+    """Take steps of the output grid; write q, v, a of each point reached to `points`, (steps + 1, 3, dof)."""
     h = grid_step(par, options)
     for k in range(points.shape[0]):
         if k > 0 and not advance((k - 1) * h, h, par, options, work, state):
@@ -30,7 +30,7 @@ def march(par, options, work, state, points):
 
 
 def follow(joint: NDArray[np.void], options: Options, steps: int) -> tuple[NDArray[np.float64], Status]:
-    """Integrate a joint, (1,), from its start; states, shape (steps + 1, 3, 56), NaN where not reached, and status."""
+    """Integrate a joint, (1,), from its start; states, shape (steps + 1, 3, dof), NaN where not reached, and status."""
     points, row = np.full((steps + 1, 3, N_DOF), np.nan), joint.view(np.recarray)[0]
     if not inside_model(row):
         return points, Status.OUTSIDE_MODEL

@@ -7,7 +7,8 @@ import signal
 
 import numpy as np
 
-from tolstat.common.tables import RESULT, Simulation, Status
+from tests.support.of_cardan import RESULT
+from tolstat.common.tables import Simulation, Status
 from tolstat.solver import stationary
 
 

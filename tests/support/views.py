@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.support import synthetic
-from tolstat.common.columns import RESULT_COLUMNS
+from tests.support.of_cardan import RESULT_COLUMNS
 from tolstat.common.tables import Options
 from tolstat.joint import Operation
 from tolstat.store.reader import Reader

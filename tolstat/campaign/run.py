@@ -192,7 +192,7 @@ def run(
     with signals_caught() as stop, _create_or_resume(study, path, rows, tell) as store, kept_workers():
         if retry:
             retry = retry.chosen(store.fidelity)
-            begin_retry(store, retry, history_specs(retry.options, *_history_options(study)), tell)
+            begin_retry(store, retry, history_specs(retry.options, *_history_options(study), study.mechanism), tell)
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
         try:

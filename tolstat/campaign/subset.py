@@ -58,7 +58,8 @@ class Subsets:
                 return sampling.scores(plan, range(first, first + count))
             return sampling.noise(plan, level, first, count)
 
-        self.walk = Walk(self.settings.per_level, self.settings.p0, self.settings.limit.level, noise)
+        self.limit = self.settings.limit(plan.mechanism)
+        self.walk = Walk(self.settings.per_level, self.settings.p0, self.limit.level, noise)
 
     @property
     def stage(self) -> range:
@@ -90,7 +91,7 @@ class Subsets:
         if (store.origin(slots) != self.origin).any():
             reason = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
             raise store_error(store.path, reason, "run the study again into another folder (--out DIR)")
-        loads = self.settings.limit.of(results).copy()
+        loads = self.limit.of(results).copy()
         valid = is_valid(loads, results["status"])
         loads[~valid] = math.inf if self.settings.unresolved == "above" else -math.inf
         self.walk.take(loads)

@@ -19,6 +19,7 @@ from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import check_target
 from tolstat.common.late import pandas as pd
+from tolstat.common.mechanism import Mechanism
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide, Workers
 from tolstat.display.progress import clock
 
@@ -170,17 +171,25 @@ def verify(
         else:
             verification = library.checks.check_near(what, near, joints or library.numerical.LEAST_NEAR, count, shown)
     units = dict.fromkeys(("median", "usual", "worst"), "1")
-    rows, by_load = library.joints.error_rows(verification), library.joints.error_rows(verification, by_kind=False)
+    mechanism = _mechanism_of(what)
+    rows, by_load = (library.joints.error_rows(verification, mechanism, by_kind) for by_kind in (True, False))
     parts: list[library.answers.Part] = [
         library.answers.Table("kinds", "By kind of load", library.joints.ERRORS, rows, units),
         library.answers.Table("loads", "By load", (), by_load, units),
-        library.answers.Sentence(library.joints.error_note(verification)),
+        library.answers.Sentence(library.joints.error_note(verification, mechanism)),
     ]
     facts = {"rows": verification.rows, "seed": verification.seed}
     facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
     deliver(library.answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
     if out is not None:
-        write_frame(pd.DataFrame(library.joints.joint_rows(verification)), out)
+        write_frame(pd.DataFrame(library.joints.joint_rows(verification, mechanism)), out)
+
+
+def _mechanism_of(what: Path) -> Mechanism:
+    if what.suffix == ".toml":
+        return library.studies.load(what).mechanism
+    with library.stores.ResultFile.open(what) as store:
+        return store.mechanism
 
 
 def export(

@@ -218,7 +218,7 @@ def simulate(plan: library.studies.Study, path: Path, until: str | None = None, 
         if until is None:
             counts = run()
         else:
-            rule = library.stop_rule.parse(until, plan.limits)
+            rule = library.stop_rule.parse(until, plan.limits, plan.mechanism)
             outcome = library.stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     if until is not None:
         look, end = outcome.look, "reached" if outcome.reached else "not reached"

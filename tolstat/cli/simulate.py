@@ -160,13 +160,15 @@ def evaluate(
     names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
     columns, others = read_table(errors, names, units)
     if others:
-        results = [name for name in others if name in library.columns.RESULT_NAMES]
+        of_results = {column.name for column in library.columns.result_columns(f.study.mechanism)}
+        results = [name for name in others if name in of_results]
         listed = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
         say(f"{errors}: columns left out: {', '.join(listed)}")
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(columns) if uniform else columns)
-    head = [["status", *f.loads], ["", *(library.load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
+    unit_of = library.load_units.units_of_loads(f.study.mechanism)
+    head = [["status", *f.loads], ["", *(unit_of[name] for name in f.loads)]]
     rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *y.T.tolist()])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
     invalid = f.status[~np.isin(f.status, library.tables.VALID)]
@@ -283,15 +285,15 @@ def show(
     with gather(faults):
         check_target(target)
     raise_all(faults)
-    joint, own_alpha, title, own_errors = library.drawings.read(source, row, alpha)
+    joint, alphas, title, own_errors = library.drawings.read(source, row, alpha)
     if errors:
         figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()
     elif own_errors is not None:
-        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.views.numbers(joint, own_errors)
+        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.drawings.numbers(joint, own_errors)
     else:
         figure, rows = (
-            library.drawings.draw_joint(joint, own_alpha, title, columns),
-            library.drawings.lengths(joint, own_alpha),
+            library.drawings.draw_joint(joint, alphas, title, columns),
+            library.drawings.lengths(joint, alphas),
         )
     (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
     typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])

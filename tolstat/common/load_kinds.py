@@ -173,7 +173,7 @@ def kinds(mechanism: Mechanism) -> dict[str, Kind]:
     psi = Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False)
     of_force: dict[str, Any] = {"unit": "N", "measure": F, "decides": True}
     of_moment: dict[str, Any] = {"unit": "N*m", "measure": T, "decides": True}
-    across = {"places": shafts, "modulus": True}
+    across: dict[str, Any] = {"places": shafts, "modulus": True}
     found = [
         F,
         T,

@@ -18,6 +18,8 @@ Integers = NDArray[np.int64]
 
 HELD, DRIVEN, CLOSED_FORM = range(3)
 """How a member moves: not at all; about its z as the input does; as the closed form of a Cardan joint says."""
+ALONG_Z = 4
+"""Triad of a pin or hole along z, in place of a number of quarter turns: e, t, z are the member's z, x, y."""
 X, Y, Z = range(3)
 """Axis of the frame of a hole's member, about which the pin's member turns in it."""
 
@@ -52,7 +54,7 @@ class Lump(NamedTuple):
     kind : str
         Lumps of one kind have the same mass, inertia and distance of the reference point.
     quarters : int
-        Quarter turns about z that take the member's axes to the triad (e, t, z).
+        Quarter turns about z that take the member's axes to the triad (e, t, z), or `ALONG_Z`.
     """
 
     name: str
@@ -160,7 +162,7 @@ class Mechanism(NamedTuple):
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of lumps and shafts."""
-        return tuple(body.name for body in (*self.lumps, *self.shafts))
+        return tuple(body.name for body in self.lumps) + tuple(shaft.name for shaft in self.shafts)
 
     @property
     def lump_kinds(self) -> tuple[str, ...]:
@@ -222,8 +224,9 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
     ]
     held = {bushing.lump: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
     bases = {bushing.base: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
+    frames = [lump.member for lump in mechanism.lumps] + [shaft.member for shaft in mechanism.shafts]
     numbers: dict[str, object] = {
-        "frame": [member[part.member] for part in (*mechanism.lumps, *mechanism.shafts)],
+        "frame": [member[name] for name in frames],
         "quarters": [lump.quarters for lump in mechanism.lumps] + [0] * len(shafts),
         "lump_kind": [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps],
         "held_by": [held[lump.name] if lump.name in held else bases[lump.name] for lump in mechanism.lumps],

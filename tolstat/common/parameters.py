@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import cache
 
 import numpy as np
@@ -21,6 +22,20 @@ MAX_ORDERS = 48
 def numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
     """Integers of PARAM: the parts of a mechanism and its loads, as `numbering` and `load_numbers` have them."""
     return numbering(mechanism) | load_numbers(mechanism)
+
+
+NUMBERS: dict[str, dict[str, NDArray[np.int64]]] = {}
+"""`numbers` of the mechanisms in use by `mark_of`."""
+
+
+@cache
+def mark_of(mechanism: Mechanism) -> str:
+    """Name of a field that tells the numbers of a mechanism from those of others with the same sizes."""
+    found = numbers(mechanism)
+    text = repr([(name, values.tolist()) for name, values in found.items()])
+    name = f"numbers_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    NUMBERS[name] = found
+    return name
 
 
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
@@ -71,6 +86,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "hole_point", "m", "hole centre less the hole's reference point, in axes of its member", shape=(pairs, 3)
         ),
         Field("hole_axis", "1", "direction of the hole axis, in axes of its member", shape=(pairs, 3)),
+        Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)
             for name, values in numbers(mechanism).items()

@@ -27,10 +27,10 @@ else:
     lines, markers, patches, ticker = (Late(f"matplotlib.{name}") for name in ("lines", "markers", "patches", "ticker"))
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
-"""Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
+"""Colours of curves, see `curve`: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
 Dash = str | tuple[float, tuple[float, ...]]
 DASHES: tuple[Dash, ...] = ("-", (0.0, (6.0, 2.0)), (0.0, (3.0, 1.5)), (0.0, (1.2, 0.9)))
-"""Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
+"""Dashes of curves: where curves coincide, the lower one shows through the gaps."""
 INK, FAINT = "#222222", "#777777"
 
 _DARK = {
@@ -116,6 +116,11 @@ def settings(others: Mapping[str, Any] | None = None) -> Iterator[None]:
 def new_figure(**look: Any) -> Figure:
     """Make a figure that is drawn into files only."""
     return matplotlib.figure.Figure(**look)
+
+
+def curve(i: int) -> dict[str, Any]:
+    """Colour and dash of the curve of bushing `i` of a group, from 0: from the fifth on, colours have another dash."""
+    return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[(i + i // len(COLOURS)) % len(DASHES)]}
 
 
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:

@@ -96,6 +96,14 @@ def limit(row: Mapping[Any, Any]) -> str:
     return loads.ANY_LIMIT if name == loads.ANY_LIMIT else f"{name} > {value(row['level'], row['unit'])}"
 
 
+NUMBERS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+
+
+def in_words(count: int) -> str:
+    """Write a number of parts: ``four``, from 13 on in digits."""
+    return NUMBERS[count] if count < len(NUMBERS) else str(count)
+
+
 def number(x: float) -> str:
     """Format to four digits; numbers below 1e7 have no positive exponent: ``13030``, not ``1.303e+04``."""
     short = f"{x:.4g}"

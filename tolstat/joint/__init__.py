@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from tolstat.joint.model import Joint as Joint
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
-    from tolstat.joint.perturbation import HOLE_OF_PIN as HOLE_OF_PIN
     from tolstat.joint.perturbation import MEANS as MEANS
     from tolstat.joint.perturbation import Operation as Operation
+    from tolstat.joint.perturbation import OperationInSeries as OperationInSeries
+    from tolstat.joint.perturbation import Series as Series
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
-    "perturbation": ("HOLE_OF_PIN", "MEANS", "Operation", "nominal_errors", "operating", "perturb"),
+    "perturbation": ("MEANS", "Operation", "OperationInSeries", "Series", "nominal_errors", "operating", "perturb"),
     "reading": ("load", "varied"),
 }
 

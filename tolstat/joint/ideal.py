@@ -167,7 +167,7 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     InputError
         See `check`.
     """
-    from tolstat.kernel.mechanics.cardan.ideal_loads import ideal_loads
+    from tolstat.kernel.cardan.ideal_loads import ideal_loads
     from tolstat.kernel.mechanics.work import work_dtype
 
     check(par)

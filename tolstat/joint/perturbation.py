@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,13 +13,12 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, PIN_QUARTERS
-from tolstat.common.cardan import HOLE_OF_PIN as NUMBER_OF_HOLE
-from tolstat.common.load_kinds import PINS
+from tolstat.common.cardan import ARM_QUARTERS, CARDAN, PIN_QUARTERS, SERIES
 from tolstat.common.loads import split
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict
-from tolstat.common.tables import ERROR, FACTORS, HOLES, blank_params
+from tolstat.common.tables import FACTORS, blank_params, tables
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
@@ -37,9 +38,6 @@ def _triads(quarters: Sequence[int]) -> Array:
 
 PIN_TRIADS: Array = _triads(PIN_QUARTERS)
 """Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
-
-HOLE_OF_PIN: dict[str, str] = {pin: HOLES[hole - 1] for pin, hole in zip(PINS, NUMBER_OF_HOLE, strict=True)}
-"""Hole in which each pin turns."""
 
 ARM_TRIADS: Array = _triads(ARM_QUARTERS)
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
@@ -68,6 +66,11 @@ class Operation(Strict):
 
     _split = model_validator(mode="before")(orders.split)
 
+    @property
+    def mechanism(self) -> Mechanism:
+        """What is simulated."""
+        return CARDAN
+
     @model_validator(mode="after")
     def _check_torsion(self) -> Operation:
         if self.partner is not None:
@@ -83,11 +86,45 @@ class Operation(Strict):
         return schema
 
 
+class Series(Strict):
+    """Two joints in series: the second one, and the tube between them. Both are the joint of the study."""
+
+    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
+    """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
+    angle: units.Angle = Field(default=np.pi, examples=["0 deg"])
+    """angle of the plane of joint 2 ahead of that of joint 1, about the tube; at 180 deg, the default, the outer shafts
+    of joints of equal misalignment are parallel, at 0 deg both joints bend the same way"""
+    offset: units.Angle = Field(default=0.0, examples=["5 deg"])
+    """angle by which the fork at the tube's output end is turned ahead of where, at equal misalignments, the output
+    turns evenly"""
+    inertia: units.Inertia = Field(examples=["0.01 kg*m^2"])
+    """moment of inertia of the tube about its axis"""
+
+    @property
+    def in_words(self) -> str:
+        """``"joint 2 of 6 deg, its plane 180 deg ahead"``."""
+        turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
+        alpha, angle = (f"{math.degrees(value):.4g} deg" for value in (self.alpha, self.angle))
+        return f"joint 2 of {alpha}, its plane {angle} ahead{turned}"
+
+
+class OperationInSeries(Operation):
+    """Operating point of two joints in series; `alpha` is that of joint 1."""
+
+    series: Series
+    """joint 2 and the tube"""
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """See `Operation.mechanism`."""
+        return SERIES
+
+
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
 
 
-def nominal_errors(n: int) -> Table:
+def nominal_errors(n: int, mechanism: Mechanism) -> Table:
     """Table of `n` joints without errors.
 
     Returns
@@ -95,7 +132,7 @@ def nominal_errors(n: int) -> Table:
     ndarray, shape (n,), dtype ERROR
         Zero deviations, factors 1.
     """
-    errors = np.zeros(n, ERROR)
+    errors = np.zeros(n, tables(mechanism).ERROR)
     for name in FACTORS:
         errors[name] = 1.0
     return errors
@@ -133,11 +170,17 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     ndarray, shape (n,), dtype PARAM
         Row i holds the parameters of joint i.
     """
-    params = blank_params(len(errors))
+    mechanism = operation.mechanism
+    params = blank_params(len(errors), mechanism)
     for name, value in _constants(joint).items():
         params[name] = value
     point = operating(operation, errors)
     params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
+    if isinstance(operation, OperationInSeries):
+        series = operation.series
+        params["alpha"][:, 1] = series.alpha
+        params["ahead"][:, 1] = 0.5 * np.pi + series.angle + series.offset
+        params["Js"][:, 0] = series.inertia
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
@@ -151,11 +194,12 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params[name] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         params["c"] *= np.sqrt(factor)[:, None, None]
-    for i, (name, number) in enumerate(zip(PINS, NUMBER_OF_HOLE, strict=True)):
-        hole = HOLES[number - 1]
-        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, name, PIN_TRIADS[i])
-        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, ARM_TRIADS[number - 1])
-        deviations = (errors[f"{hole}.diameter"], errors[f"{name}.diameter"], errors[f"{name}.clearance"])
+    lumps = mechanism.lumps
+    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters for lump in lumps]), strict=True))
+    for i, (pin, hole, _) in enumerate(mechanism.pairs):
+        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
+        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
+        deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"])
         params["clearance"][:, i] = _clearance(joint.contact, *deviations)
     return params
 
@@ -231,15 +275,15 @@ def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> A
     return np.asarray(clearance)
 
 
-PIN_OF_LOAD = {
-    name: pin
-    for pin, hole in enumerate(NUMBER_OF_HOLE, 1)
-    for name in (f"cross{pin}.F", f"fork{hole}.F", f"pin{pin}.contact")
-}
-"""Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
+@cache
+def _pin_of_load(mechanism: Mechanism) -> dict[str, str]:
+    """Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
+    pin_of_lump = {lump: pair.pin for pair in mechanism.pairs for lump in (pair.pin, pair.hole)}
+    forces = {f"{b.name}.F": pin_of_lump[b.lump] for b in mechanism.bushings if b.lump in pin_of_lump}
+    return forces | {f"{pair.pin}.contact": pair.pin for pair in mechanism.pairs}
 
 
-def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str) -> list[dict[str, Any]]:
+def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str, mechanism: Mechanism) -> list[dict[str, Any]]:
     """Rows of limits for people: one for all loads that are the same force and have the same limit.
 
     Parameters
@@ -248,11 +292,14 @@ def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str) -> list[
         Rows with ``load``, the key `level` of the limit, and the key `size`.
     level, size : str
         Of the rows of one force, that of the largest `size` is shown, with the names of all in ``load``.
+    mechanism : Mechanism
+        Whose loads they are.
     """
     by_force: dict[Any, list[Mapping[str, Any]]] = {}
     for row in rows:
         name, points = split(row["load"])
-        force = (PIN_OF_LOAD[name], points, row[level]) if name in PIN_OF_LOAD else row["load"]
+        pin = _pin_of_load(mechanism).get(name)
+        force = row["load"] if pin is None else (pin, points, row[level])
         by_force.setdefault(force, []).append(row)
     return [
         {**max(same, key=lambda row: row[size]), "load": ", ".join(row["load"] for row in same)}

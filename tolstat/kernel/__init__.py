@@ -9,7 +9,7 @@ t : float
     Time, s; theta is omega t.
 h : float
     Length of a step, s.
-q, v, a : ndarray, shape (56,)
+q, v, a : ndarray, shape (dof,)
     Unknowns and their first and second derivatives; m and rad, per s, per s^2. Textbook equations have (n,).
 cv, ca : float
     dv/dq (1/s) and da/dq (1/s^2) of the integration formula.
@@ -20,7 +20,7 @@ stage : int
 fresh : bool
     Whether the last correction was made with a new tangent.
 par : record of PARAM
-    The joint, in SI units.
+    The joint, in SI units, and the numbers of its mechanism (`common.mechanism`).
 rows : ndarray of PARAM, shape (n,)
     Several joints.
 options : Options
@@ -44,14 +44,16 @@ out : ndarray, or record of KERNEL_RESULT
 lane : int
     Number of the lane; 0 for a single joint.
 body : int
-    Number of the body, as in `mechanics.topology`.
-bushing : int
-    Number of the bushing, 0 to 7, as in `mechanics.topology`.
-pin : int
-    Number of the pin, 0 to 3.
+    Number of the body: lumps, then shafts.
+base : int
+    Number of the body that holds a bushing.
+bushing, pin, hinge, shaft, joint : int
+    Number of the bushing; of the pair of pin and hole; of the hinge; of the shaft; of the Cardan joint.
+mechanism : Mechanism
+    What the joints are.
 status : int
     How a joint has ended, a `Status`.
-loads : ndarray, shape (N_LOADS,)
+loads : ndarray, shape (n,)
     Values of all loads at one instant, N, N m or 1.
 mask : bool, read as lanes
     Joints that the function applies to.

@@ -19,7 +19,7 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, raise_all
-from tolstat.common.loads import split, unit_text
+from tolstat.common.loads import load_of, unit_text
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Budget, Costs, Opt
@@ -321,8 +321,9 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     study, faults, statements = view.study, list[Fault](), list[stop_rule.Statement]()
     for target in targets:
         with gather(faults):
-            statements.append(stop_rule.parse(target, view.limits, "", "--target", EXAMPLE))
-            lacking = [name for name in statements[-1].limit.loads if not holds(view.columns, split(name)[0])]
+            statements.append(stop_rule.parse(target, view.limits, view.mechanism, "", "--target", EXAMPLE))
+            asked = statements[-1].limit.loads
+            lacking = [name for name in asked if not holds(view.columns, load_of(name, view.mechanism))]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))
@@ -334,7 +335,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         kept_names |= set(names)
     every, found = scaling.tolerances(study), list[ladder.Ladder]()
     with gather(faults):
-        found += ladder.ladders(study, every, prices.of(every, costs))
+        found += ladder.ladders(study, every, prices.of(every, study.mechanism, costs))
     raise_all(faults)
     free = [own for own in found if len(own.rungs) > 1 and not kept_names & set(own.line.names)]
     if not free:

@@ -118,8 +118,8 @@ def drawn(view: View) -> list[Drawn]:
                 key = (entry.pattern, meaning.number, meaning.unit, band)
                 errors_of.setdefault(key, {}).update(dict.fromkeys(meaning.errors))
                 moved |= {*meaning.errors}
-            feature, _, kind = site.name.partition(".")
-            if feature in axes.PAIRS and kind in axes.ORIENTATIONS:  # the tilt of a pair's axis moves both its features
+            feature, _, kind = site.name.rpartition(".")
+            if axes.is_pair(feature) and kind in axes.ORIENTATIONS:  # the tilt of a pair's axis moves both its features
                 moved |= {*axes.columns_of(site.name)}
             for name in moved:
                 entries_of.setdefault(name, []).append(entry.pattern)
@@ -199,7 +199,7 @@ def _draw_load(ax: Axes, load: Sample) -> None:
 
 def _drawn_panel(drawn: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
     """One picture; of several with one entry each says whether it is of offsets or of tilts."""
-    kinds = dict.fromkeys(name.partition(".")[2].partition("_")[0] for name in drawn.errors)
+    kinds = dict.fromkeys(name.rpartition(".")[2].partition("_")[0] for name in drawn.errors)
     kind = f", {' and '.join(kinds)}" if sum(other.entry == drawn.entry for other in every) > 1 else ""
     outside = "" if drawn.band is None else f"; {text.percent(drawn.outside)} outside"
     others = f"; includes {' and '.join(drawn.others)}" if drawn.others else ""

@@ -7,18 +7,19 @@ from contextlib import suppress
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import accuracy as comparison
 from tolstat.analysis import ranks
 from tolstat.campaign.remedy import remedy
-from tolstat.common import load_kinds, units
+from tolstat.common import units
 from tolstat.common.errors import TolstatError
-from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import FloatArray, load_of, units_of_loads
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table, plain
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, plain
 from tolstat.questions.shares import Cell, inapplicable, rows_of, share, word
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
@@ -82,10 +83,11 @@ def modes(view: View) -> Answer:
     if not np.isfinite(view.mode_share).any():
         remedy = 'add "pin*.share_*" to [output] results of the study, if it has a list'
         raise inapplicable(view, "has no contact modes of valid joints", remedy)
-    rows = rows_of({"pin": load_kinds.PINS} | dict(zip(MODE_WORDS, view.mode_share.T.tolist(), strict=True)))
+    pins = kinds(view.mechanism)["contact"].places
+    rows = rows_of({"pin": pins} | dict(zip(MODE_WORDS, view.mode_share.T.tolist(), strict=True)))
     lines = [f"{row['pin']}: " + ", ".join(f"{column.head} {column.cell(row)}" for column in MODES[1:]) for row in rows]
-    draw, size = partial(_draw_modes, rows=rows), (drawing.WIDTH, 2.0)
-    panel = Panel("modes", "Contact modes", "; ".join(lines), draw, size, rows=load_kinds.PINS)
+    draw, size = partial(_draw_modes, rows=rows), (drawing.WIDTH, 1.0 + 0.25 * len(pins))
+    panel = Panel("modes", "Contact modes", "; ".join(lines), draw, size, rows=pins)
     note = "Share of the revolution that each pin spends in each mode, mean of the settled joints. None: the pin "
     note += "touches nothing; one point: one end; two point: both ends, on opposite sides; uniform: along the hole."
     table = Table("modes", "Mean share of the revolution", MODES, rows, dict.fromkeys(MODE_WORDS, "1"))
@@ -209,10 +211,10 @@ def their_errors(view: View) -> Rows:
 
 
 def _draw_modes(ax: Axes, rows: Rows) -> None:
-    left = np.zeros(4)
+    left = np.zeros(len(rows))
     for (key, words), colour in zip(MODE_WORDS.items(), COLOURS, strict=True):
         share = 100.0 * np.array([row[key] for row in rows])
-        ax.barh(range(4), share, left=left, height=0.62, color=colour, edgecolor="white", label=words)
+        ax.barh(range(len(rows)), share, left=left, height=0.62, color=colour, edgecolor="white", label=words)
         left += share
     ax.set(xlim=(0.0, 100.0), xlabel="share of the revolution [%]")
 
@@ -282,12 +284,13 @@ def accuracy(view: View) -> Answer:
         remedy = f"check some joints: tolstat verify {view.path}"
         raise inapplicable(view, "holds no checks of the numerical error", remedy)
     title = "Relative to the largest load of its kind in the joint"
-    table = Table("errors", title, ERRORS, error_rows(checks), dict.fromkeys(("median", "usual", "worst"), "1"))
-    lead = Sentence(text.sentence(error_note(checks, view.limits)), "lead")
+    rows, unit = error_rows(checks, view.mechanism), dict.fromkeys(("median", "usual", "worst"), "1")
+    table = Table("errors", title, ERRORS, rows, unit)
+    lead = Sentence(text.sentence(error_note(checks, view.mechanism, view.limits)), "lead")
     return Answer("accuracy", "Numerical error", [lead, table], {"numerical_error": view.numerical_error})
 
 
-def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
+def error_rows(verification: Verification, mechanism: Mechanism, by_kind: bool = True) -> Rows:
     """Distribution of the errors over the joints, for each check and each kind of load, or load, that is kept.
 
     Returns
@@ -296,23 +299,23 @@ def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
         ``load`` (``F``: the worst of its bushings in each joint; ``cross1.F`` if not `by_kind`), ``error`` (name of the
         check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
     """
-    by_check, kept = errors(verification), _kept(verification)
-    columns = {comparison.OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
+    by_check, columns = errors(verification, mechanism), _kept(verification, mechanism)
     if by_kind:
-        columns = {load_kinds.LOAD_KINDS[k].key: k for k in np.unique(comparison.KIND_OF[kept])}
-        by_check = {name: comparison.by_kind(values) for name, values in by_check.items()}
+        shown = {load_of(name, mechanism).kind.key for name in columns}
+        columns = {key: k for k, key in enumerate(kinds(mechanism)) if key in shown}
+        by_check = {name: comparison.by_kind(values, mechanism) for name, values in by_check.items()}
     each = ((load, name, *comparison.spread(by_check[name][:, k])) for load, k in columns.items() for name in by_check)
     return [dict(zip(("load", "error", "joints", "median", "usual", "worst"), row, strict=True)) for row in each]
 
 
-def errors(verification: Verification) -> dict[str, FloatArray]:
+def errors(verification: Verification, mechanism: Mechanism) -> dict[str, FloatArray]:
     """Errors, (m, loads), by check, as of `accuracy.differences`; last `TOTAL`, from `accuracy.numerical`."""
     results = {name: check.results for name, check in verification.checks.items()}
-    by_check = {name: comparison.differences(verification.base, other) for name, other in results.items()}
-    return by_check | {TOTAL: comparison.numerical(verification.base, results)}
+    by_check = {name: comparison.differences(verification.base, other, mechanism) for name, other in results.items()}
+    return by_check | {TOTAL: comparison.numerical(verification.base, results, mechanism)}
 
 
-def joint_rows(verification: Verification) -> Rows:
+def joint_rows(verification: Verification, mechanism: Mechanism) -> Rows:
     """Errors of every joint, by check and load kept.
 
     Returns
@@ -321,12 +324,13 @@ def joint_rows(verification: Verification) -> Rows:
         ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
         the campaign's value minus the check's, relative to the largest load of the measure.
     """
-    base, rows = comparison.loads(verification.base), []
+    base, rows = comparison.loads(verification.base, mechanism), list[Row]()
     for name, check in verification.checks.items():
-        other, error = comparison.loads(check.results), comparison.differences(verification.base, check.results)
+        other = comparison.loads(check.results, mechanism)
+        error = comparison.differences(verification.base, check.results, mechanism)
         states = [Status(code).label for code in check.results["status"]]
-        for k in np.flatnonzero(_kept(verification)):
-            fixed = {"load": comparison.OBSERVABLES[k], "unit": UNIT_OF_LOAD[comparison.OBSERVABLES[k]]}
+        for load, k in _kept(verification, mechanism).items():
+            fixed = {"load": load, "unit": units_of_loads(mechanism)[load]}
             values = zip(verification.rows, states, base[:, k], other[:, k], error[:, k], strict=True)
             for row, status, *numbers in values:
                 figures = dict(zip(("campaign", "value", "error"), map(float, numbers), strict=True))
@@ -334,13 +338,13 @@ def joint_rows(verification: Verification) -> Rows:
     return rows
 
 
-def error_note(verification: Verification, limits: Iterable[str] = ()) -> str:
+def error_note(verification: Verification, mechanism: Mechanism, limits: Iterable[str] = ()) -> str:
     """Sentence on the numerical error of the largest loads: of kinds that every report shows, and those of `limits`."""
-    kinds = {load_of(name).kind.key for name in limits}
-    total = [row for row in error_rows(verification) if row["error"] == TOTAL]
-    shown = [row for row in total if row["load"] in kinds or load_kinds.KIND[row["load"]].shown] or total
+    limited = {load_of(name, mechanism).kind.key for name in limits}
+    total = [row for row in error_rows(verification, mechanism) if row["error"] == TOTAL]
+    shown = [row for row in total if row["load"] in limited or kinds(mechanism)[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
-    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in load_kinds.LOAD_KINDS}
+    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in kinds(mechanism).values()}
     words = [f"{called[row['load']]} {row['median']:.1e}, at worst {row['worst']:.1e}" for row in known]
     noun = "error of numerics and fidelity" if comparison.FIDELITY in verification.checks else "numerical error"
     base = verification.base["status"] == Status.OK
@@ -366,7 +370,8 @@ def in_percent(error: float) -> str:
     return f"< {text.percent(LEAST)}" if error < LEAST else text.percent(error)
 
 
-def _kept(verification: Verification) -> NDArray[np.bool_]:
-    """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
-    has_values = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
-    return np.asarray(has_values | ~has_values.any())
+def _kept(verification: Verification, mechanism: Mechanism) -> dict[str, int]:
+    """Loads that the campaign keeps, with their numbers in `accuracy.observables`; all if no joint has a value."""
+    has_values = ~np.isnan(comparison.loads(verification.base, mechanism)).all(axis=0)
+    kept = np.asarray(has_values | ~has_values.any())
+    return {name: k for k, name in enumerate(comparison.observables(mechanism)) if kept[k]}

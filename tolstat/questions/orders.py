@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.columns import result_columns
 from tolstat.common.errors import NotApplicable
-from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
-from tolstat.common.loads import LOADS, FloatArray, load_of
+from tolstat.common.load_kinds import ORDERS, kinds
+from tolstat.common.loads import FloatArray, load_of, loads_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
@@ -45,7 +45,7 @@ class Orbit(NamedTuple):
     Attributes
     ----------
     shaft : str
-        ``"input"`` or ``"output"``.
+        Name of the shaft: ``"input"``.
     near : str
         Which joint: ``"nominal"``, or the name in `NEAR` of the quantile that its largest lateral force is nearest to.
     row : int
@@ -120,14 +120,16 @@ def orders(view: View, orbits: bool = False) -> Answer:
     InputError
         When a joint has to be simulated again and this version cannot read the file's joint or options.
     """
-    names = [name for name in view.kept_loads if LOADS[name].kind.orders]
+    kind_of = {name: load.kind for name, load in loads_of(view.mechanism).items()}
+    names = [name for name in view.kept_loads if kind_of[name].orders]
     if not names:
         remedy = 'let [output] results of the study select them, such as "*_1x_max", and run it again'
         raise unusable(view, "holds no amplitudes of orders", remedy)
     joints = view.count(*VALID)
     if not joints:
         raise unusable(view, "has no joint with a valid result", "resume the campaign")
-    rows = [_amplitude(view, name) for name in sorted(names, key=lambda name: LOAD_KINDS.index(LOADS[name].kind))]
+    in_order = list(kinds(view.mechanism))
+    rows = [_amplitude(view, name) for name in sorted(names, key=lambda name: in_order.index(kind_of[name].key))]
     facts: dict[str, Any] = {"joints": joints, "left_out": view.counts.done - joints}
     parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
     notes = [f"{joints} joints, {facts['left_out']} without a valid load left out"]
@@ -160,15 +162,16 @@ def orders_on_page(view: View, asked: Asked) -> Answer:
 
 def are_asked(view: View) -> bool:
     """Whether the study asks for loads of the shafts or orders: by a limit, or by selecting them among its results."""
-    selected = view.kept_loads if len(view.columns) < len(RESULT_COLUMNS) else ()
-    asked = [load_of(name) for name in (*view.limits, *selected)]
+    selected = view.kept_loads if len(view.columns) < len(result_columns(view.mechanism)) else ()
+    asked = [load_of(name, view.mechanism) for name in (*view.limits, *selected)]
     return any(load.kind.orders or load.place.group == "shaft" for load in asked)
 
 
 def _amplitude(view: View, name: str) -> Row:
     """One row of the table ``amplitudes``."""
     load, (quantity, _, order) = view.load(name), name.removesuffix("x").rpartition("_")
-    row = {"quantity": quantity, "noun": LOADS[name].kind.noun, "order": int(order), "load": name, "unit": load.unit}
+    noun = load_of(name, view.mechanism).kind.noun
+    row = {"quantity": quantity, "noun": noun, "order": int(order), "load": name, "unit": load.unit}
     row["nominal"] = load.nominal
     for key, share in SHARES.items():
         amplitude = load.quantile(share)
@@ -179,7 +182,7 @@ def _amplitude(view: View, name: str) -> Row:
 def _orbits(view: View) -> tuple[list[list[Orbit]], str, float]:
     """Orbits of each shaft whose lateral force is kept, their source, and how far from the stored values."""
     orbits, origin, apart = list[list[Orbit]](), "", 0.0
-    for shaft in SHAFTS:
+    for shaft in kinds(view.mechanism)["lateral"].places:
         name = f"{shaft}.lateral"
         if name not in view.kept_loads or not view.load(name).valid.size:
             continue

@@ -21,7 +21,7 @@ from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import special
-from tolstat.common.loads import LOADS, FloatArray, Limit
+from tolstat.common.loads import FloatArray, Limit, load_of
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
@@ -99,7 +99,7 @@ def simulate(
         raise InputError([Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"')])
     else:
         study = source.at(work.point).at("")
-        wanted = limit_of(limit, study.limits, "--limit", EXAMPLE)
+        wanted = limit_of(limit, study.limits, study.mechanism, "--limit", EXAMPLE)
         levels = dict(zip(wanted.loads, wanted.levels, strict=True))
         fields = {"load": wanted.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
         plan = subset_of(study, fields | ({} if seed is None else {"seed": seed}))
@@ -151,7 +151,7 @@ def rare(*views: View, delivery: Delivery = prediction.DELIVERY) -> Answer:
     StoreError
         When a file is none of a subset simulation, or it is not finished.
     """
-    limits = {subset.Subsets(_plan_of(view)).settings.limit for view in views}
+    limits = {subset.Subsets(_plan_of(view)).settings.limit(view.mechanism) for view in views}
     if len(limits) != 1:
         remedy = "give files of one simulation, which differ in the seed alone"
         raise InputError([Fault(", ".join(str(view.path) for view in views), "are of several limits", remedy)])
@@ -205,7 +205,8 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
         unresolved.append(subsets.take(store))
     estimate, wide = walk.estimate(), walk.estimate(prediction.half(CONFIDENCE))
     p, deviation = estimate.probability, estimate.deviation
-    factors = numerical(view, settings.limit, walk.last)
+    limit = settings.limit(view.mechanism)
+    factors = numerical(view, limit, walk.last)
     low, high = factors or (1.0, 1.0)
     ends = prediction.of_share(wide.lower * low, min(1.0, wide.upper * high), delivery, CONFIDENCE)
     row = {"file": view.path.name, "seed": settings.seed, "reached": walk.reached} | estimate._asdict()
@@ -217,7 +218,7 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     row["next_lower"], row["next_upper"] = ends
     levels, probability = [], 1.0
     for number, level in enumerate(walk.levels):
-        head = {"seed": settings.seed, "load": settings.limit.name, "unit": settings.limit.unit, "level": number}
+        head = {"seed": settings.seed, "load": limit.name, "unit": limit.unit, "level": number}
         levels.append(head | {"threshold": level.threshold, "probability": probability} | level._asdict())
         probability *= level.share
     return row, levels
@@ -243,7 +244,7 @@ def numerical(view: View, limit: Limit, last: NDArray[np.intp]) -> tuple[float, 
     """
     ends: list[list[FloatArray]] = [[], [], []]
     for name, level in zip(limit.loads, limit.levels, strict=True):
-        load = replace(Sample.of(LOADS[name].of(view.results), view.status, name=name), limit=level)
+        load = replace(Sample.of(load_of(name, view.mechanism).of(view.results), view.status, name=name), limit=level)
         known = error_budget.near(view, load)
         if known is None:
             return None

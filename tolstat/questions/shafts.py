@@ -221,7 +221,8 @@ def _output(pair: Shafts) -> Rows:
     store = pair.first.store
     assert store.operation.partner is not None
     alone = store.operation.model_copy(update={"partner": None})
-    ratio, acceleration = output_motion(store.operation.partner, perturb(joint_of(store, 0), alone, nominal_errors(1)))
+    params = perturb(joint_of(store, 0), alone, nominal_errors(1, store.mechanism))
+    ratio, acceleration = output_motion(store.operation.partner, params)
     bound = 2.0 * pair.sum_of("psi")
     faster = [n * store.operation.speed**2 * pair.sum_of(f"psi_{n}x") for n in ORDERS]
     unevenness, largest = float(np.ptp(ratio) / ratio.mean()), float(np.abs(acceleration).max())

@@ -338,7 +338,7 @@ class Simulation:
     @cached_property
     def seconds(self) -> float:
         """Time of a joint at all points, s, divided among the processes; changes as joints are simulated."""
-        warm_up()
+        warm_up(mechanism=self._study.mechanism)
         options = sets.options_of(self._study, self._store)
         return sets.seconds_per_joint(self._study, options, PILOT, self._asked.points) / self._workers
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.campaign.remedy import remedy
 from tolstat.common.columns import holds
-from tolstat.common.load_kinds import BUSHINGS, Kind
-from tolstat.common.loads import PANELS, QUANTITY, UNIT_OF_LOAD, FloatArray, names_of, unit_text
+from tolstat.common.load_kinds import Kind, kinds
+from tolstat.common.loads import QUANTITY, FloatArray, load_of, loads_of, names_of, panels, unit_text
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import read_section
-from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
+from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status, tables
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Figure, Panel, Panels, Part, Row, Rows, Sentence, Sheet, Table, plain
@@ -25,7 +26,7 @@ from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
 from tolstat.study.design import KEYS
-from tolstat.study.selection import UNITS
+from tolstat.study.selection import error_units
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
@@ -57,32 +58,33 @@ def sweep(view: View) -> Answer:
     columns: dict[str, Sequence[object]] = {axis.head: axis.values.tolist() for axis in swept_axes(view)}
     columns["status"] = [Status(int(code)).label for code in view.status]
     names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
-    columns |= {_head(name, UNIT_OF_LOAD[name]): view.simulated(name).tolist() for name in names}
+    columns |= {_head(name, loads_of(view.mechanism)[name].unit): view.simulated(name).tolist() for name in names}
     rows = rows_of(columns)
-    seen = [_short(row) for row in rows]
+    seen = [_short(row, view.mechanism) for row in rows]
     ranked = [name for name in (seen[0] if seen else ()) if "." in name][1:]
     table = Table("sweep", "Worst bushing", plain(seen, ranked), rows, seen=seen)
     pictures: list[Part] = []
     if view.bushing_loads:
-        panels = [_panel(view, group, kind) for group, kind in PANELS if _kept(view, group, kind)]
-        pictures = [Panels(panels), Sheet("sweep", partial(sheet, view))]
+        drawn = [_panel(view, group, kind) for group, kind in panels(view.mechanism) if _kept(view, group, kind)]
+        pictures = [Panels(drawn), Sheet("sweep", partial(sheet, view))]
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
 
 
 def _kept(view: View, group: str, kind: Kind) -> dict[str, FloatArray]:
-    """Largest loads of one kind at ``cross`` or ``fork`` bushings that the study keeps, (n,) each."""
-    return {name: view.simulated(name) for name in names_of(group, kind) if name in view.bushing_loads}
+    """Largest loads of one kind at the bushings of a group that the study keeps, (n,) each."""
+    names = names_of(group, kind, view.mechanism)
+    return {name: view.simulated(name) for name in names if name in view.bushing_loads}
 
 
 def _head(name: str, unit: str) -> str:
     return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
-def _short(row: Row) -> Row:
-    """Row for people: largest force and torque of the cross bushings and of the fork bushings."""
+def _short(row: Row, mechanism: Mechanism) -> Row:
+    """Row for people: largest force and torque of each group of bushings."""
     short = dict(row)
-    for group, kind in PANELS:
-        heads = [_head(name, kind.unit) for name in names_of(group, kind)]
+    for group, kind in panels(mechanism):
+        heads = [_head(name, kind.unit) for name in names_of(group, kind, mechanism)]
         if kept := [short.pop(head) for head in heads if head in short]:
             short[f"{group}.{kind.symbol} [{kind.unit}]"] = float(np.fmax.reduce(kept))
     return short
@@ -100,7 +102,7 @@ def sheet(view: View) -> Figure:
     """Draw the loads against the first swept quantity.
 
     One swept quantity gives a line for each bushing. Several give a line for each combination of the others,
-    of the largest load among the four bushings, coloured by the second.
+    of the largest load among the bushings of a group, coloured by the second.
 
     Parameters
     ----------
@@ -110,19 +112,23 @@ def sheet(view: View) -> Figure:
     Returns
     -------
     Figure
-        Four panels; joints that did not settle are hollow, those without a result are crosses at the foot.
+        A panel for each group and kind; joints that did not settle are hollow, those without a result are crosses at
+        the foot.
     """
     axes, small = swept_axes(view), "largest modulus over the last revolution of each joint"
     if len(axes) > 1:
-        small = f"largest of the four bushings, coloured by {axes[1].head}"
+        group, kind = panels(view.mechanism)[0]
+        bushings = text.in_words(len(names_of(group, kind, view.mechanism)))
+        small = f"largest of the {bushings} bushings, coloured by {axes[1].head}"
     if len(axes) > 2:
         small += f"; one line for each {', '.join(axis.label for axis in axes[2:])}"
     title = f"{view.name}: largest loads against {axes[0].label if axes else 'the number of the joint'}"
-    return drawing.sheet([_panel(view, *panel) for panel in PANELS], title, [view.head(), small], columns=2)
+    drawn = [_panel(view, *panel) for panel in panels(view.mechanism)]
+    return drawing.sheet(drawn, title, [view.head(), small], columns=2)
 
 
 def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
-    """Draw the loads of one kind at four bushings: ``cross`` or ``fork``."""
+    """Draw the loads of one kind at the bushings of a group."""
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
     ax.set(xlabel=first.head, ylabel=f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
     ax.xaxis.set_major_locator(style.ticker.MaxNLocator(6))
@@ -131,10 +137,10 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
         drawing.empty(ax, "not kept by the study")
         return
     if len(axes) < 2:
-        looks = zip(names_of(group, kind), style.COLOURS, style.DASHES, strict=True)
-        for i, (name, colour, dash) in enumerate(looks, 1):
+        for i, name in enumerate(names_of(group, kind, view.mechanism)):
             if name in loads:
-                _line(ax, view, first, loads[name], np.arange(view.n), color=colour, ls=dash, label=f"bushing {i}")
+                bushing = load_of(name, view.mechanism).place.name.replace(group, "bushing ")
+                _line(ax, view, first, loads[name], np.arange(view.n), **style.curve(i), label=bushing)
     else:
         largest, others = np.max(list(loads.values()), axis=0), np.column_stack([axis.values for axis in axes[1:]])
         values, shades = np.unique(axes[1].values), style.shades()
@@ -210,10 +216,11 @@ def swept_axes(view: View) -> list[Axis]:
     """
     patterns = _patterns(read_section(view.store.path, view.store.study_text, "sweep"))
     errors = view.errors(np.arange(view.n))
-    columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
+    columns = {(field.name, field.unit): errors[field.name] for field in tables(view.mechanism).error_fields}
     if len(view.parts) == 1:  # of several operating points none is swept
         points = recorded.operating_points(view.store, slice(view.store.first_sample, None))
-        columns |= {(f"operation.{key}", UNITS[f"operation.{key}"]): values for key, values in points.items()}
+        units = error_units(view.mechanism)
+        columns |= {(f"operation.{key}", units[f"operation.{key}"]): of for key, of in points.items()}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}
@@ -274,7 +281,7 @@ def cases(view: View) -> Answer:
     if not store.case_names:
         raise inapplicable(view, "does not list its joints", "give the result file of a study that lists its joints")
     rows = _listed(store)
-    seen = [_worst(row) for row in rows]
+    seen = [_worst(row, store.mechanism) for row in rows]
     title, counts = "Change of the loads by the errors of each joint", store.counts()
     parts: list[Part] = [Table("cases", title, plain(seen, RANKED), rows, seen=seen)]
     parts.append(Sentence(f"{counts.done} of {counts.total} joints, {counts.shortfall}"))
@@ -303,9 +310,9 @@ def _listed(store: Reader) -> Rows:
     )
     columns["remedy"] = [remedy(row, store.options | keys) for row, keys in zip(results, set_by_variants, strict=True)]
     gamma = relative_errors(results, design["group"])
-    for b, bushing in enumerate(BUSHINGS):
+    for b, bushing in enumerate(kinds(store.mechanism)["F"].places):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
-            if holds(store.columns, f"{bushing}.{letter}"):
+            if holds(store.columns, load_of(f"{bushing}.{letter}", store.mechanism)):
                 columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b].tolist()
                 columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load].tolist()
     return rows_of(columns | _reference(store))
@@ -325,7 +332,7 @@ def relative_errors(results: NDArray[np.void], group: NDArray[np.int32]) -> NDAr
 
     Returns
     -------
-    ndarray, shape (n, 8, 2)
+    ndarray, shape (n, bushings, 2)
         Relative difference in per cent, signed: force, torque. NaN unless the joint and the first of its group are OK.
     """
     loads = np.stack([results["F_max"], results["T_max"]], axis=-1)
@@ -344,15 +351,16 @@ def _reference(store: Reader) -> dict[str, Sequence[Any]]:
     columns |= {key: np.full(store.n, np.nan) for key in ("reference_change", "error_F", "error_T")}
     columns["reference"][slots] = [Status(int(code)).label for code in true["status"]]
     columns["reference_change"][slots] = true["closure"]
-    error = accuracy.by_kind(accuracy.differences(verified.base, true))
+    error = accuracy.by_kind(accuracy.differences(verified.base, true, store.mechanism), store.mechanism)
     columns["error_F"][slots], columns["error_T"][slots] = error[:, 0], error[:, 1]
     return {name: values.tolist() for name, values in columns.items()}
 
 
-def _worst(row: Row) -> dict[str, Any]:
+def _worst(row: Row, mechanism: Mechanism) -> dict[str, Any]:
     """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
     short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "period")}
     for head in ("Gamma_F [%]", "Gamma_T [%]"):
-        if gamma := [row[name] for bushing in BUSHINGS if (name := f"{bushing}.{head}") in row]:
+        names = [f"{bushing}.{head}" for bushing in kinds(mechanism)["F"].places]
+        if gamma := [row[name] for name in names if name in row]:
             short[head] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
     return short

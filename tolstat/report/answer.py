@@ -123,7 +123,7 @@ def _notes(view: View) -> Iterator[Part]:
     if view.method != "sweep":
         yield Sentence(exceedance.note(view))
     if view.verification:
-        yield Sentence(joints.error_note(view.verification, view.limits))
+        yield Sentence(joints.error_note(view.verification, view.mechanism, view.limits))
 
 
 def _run(view: View) -> Iterator[Part]:

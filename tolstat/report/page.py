@@ -330,7 +330,7 @@ def _basis(view: View) -> list[Verdict]:
     note = counts.shortfall + (f", {pending} still pending" if pending else "")
     whole = view.count(*VALID) == counts.total
     cards = [Verdict("" if whole else "open", str(counts.done), "joints simulated", (note,))]
-    kinds = {loads.load_of(name).kind.key for name in view.leading}
+    kinds = {loads.load_of(name, view.mechanism).kind.key for name in view.leading}
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])

@@ -12,9 +12,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.channels import LOAD_HISTORIES
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import load_histories
 from tolstat.common.cores import available_cores
-from tolstat.common.tables import RESULT, Fidelity, Options, blank_params
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import Fidelity, Options, blank_params
 from tolstat.solver import histories, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
@@ -26,43 +28,55 @@ def announce() -> None:
         LOG.info("compiling the kernels: about half a minute, once per machine and version")
 
 
-def _outside_model(torque_reverses: bool = False) -> NDArray[np.void]:
+def _outside_model(mechanism: Mechanism, torque_reverses: bool = False) -> NDArray[np.void]:
     """Parameters of a joint with negative clearance, whose simulation ends at once."""
-    params = blank_params(1)
+    params = blank_params(1, mechanism)
     params["clearance"] = -1.0
     if torque_reverses:
         params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0
     return params
 
 
-def _simulate(joints: int, options: Options) -> None:
-    params, results = np.repeat(_outside_model(), joints), np.zeros(joints, RESULT).view(np.recarray)
-    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results))
+def _simulate(joints: int, options: Options, mechanism: Mechanism) -> None:
+    params, results = np.repeat(_outside_model(mechanism), joints), simulation.blank_results(joints, mechanism)
+    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results, mechanism=mechanism))
 
 
-def _explicit(options: Options) -> None:
-    results, steps = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
-    joint, settings, revolutions = _outside_model(torque_reverses=True), refinement.settings(options), np.full(1, 2**31)
-    list(simulation.simulate_together(joint, settings, revolutions, False, results, results[:, None], steps))
+def _explicit(options: Options, mechanism: Mechanism) -> None:
+    results, steps = simulation.blank_results(1, mechanism), np.full(1, options.steps_per_rev)
+    joint, settings = _outside_model(mechanism, torque_reverses=True), refinement.settings(options)
+    left, blocks = np.full(1, 2**31), results[:, None]
+    list(simulation.simulate_together(joint, settings, left, False, results, blocks, steps, mechanism))
 
 
-KERNELS: dict[str, Callable[[Options], object]] = {
+def _count_steps(options: Options, mechanism: Mechanism) -> None:
+    simulation.explicit_steps(_outside_model(mechanism, torque_reverses=True), options, mechanism)
+
+
+def _starts(options: Options, mechanism: Mechanism) -> None:
+    simulation.starts(blank_params(1, mechanism).view(np.recarray), options, mechanism)
+
+
+def _count_cycles(options: Options, mechanism: Mechanism) -> None:
+    loads = {name: np.zeros((2, *history.shape)) for name, history in load_histories(mechanism).items()}
+    histories.cycles(loads, mechanism)
+
+
+KERNELS: dict[str, Callable[[Options, Mechanism], object]] = {
     "lockstep.lockstep": partial(_simulate, simulation.MOST_ALONE + 1),
     "lockstep.one_at_a_time": partial(_simulate, 1),
     "explicit.explicit": _explicit,
-    "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
-    "starts.write_starts": lambda options: simulation.starts(blank_params(1).view(np.recarray), options),
+    "explicit.count_steps": _count_steps,
+    "starts.write_starts": _starts,
     "ideal.ideal_revolution": partial(_simulate, 1),
-    "rainflow.count_joint": lambda options: histories.cycles(
-        {history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES}
-    ),
+    "rainflow.count_joint": _count_cycles,
 }
 """Kernels that Python calls, by their names in the cache, each with a call that compiles it."""
 SECOND = ("lockstep.one_at_a_time", "explicit.explicit")
 """Kernels that the second process compiles; they take about as long as all others together."""
 
 
-def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
+def kernels(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
     """Names of the kernels that joints with these settings need.
 
     Kernels with explicit steps are only among them where one of the joints `params` needs them; without them such a
@@ -71,46 +85,51 @@ def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[st
     if options.fidelity == Fidelity.IDEAL:
         return ["ideal.ideal_revolution", "rainflow.count_joint"]
     left_out = {"ideal.ideal_revolution"}
-    if params is None or not len(simulation.hitting(params, options)):
+    if params is None or not len(simulation.hitting(params, options, mechanism)):
         left_out |= {"explicit.explicit", "explicit.count_steps"}
     return [name for name in KERNELS if name not in left_out]
 
 
-def missing(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
-    """Names of those that are not in the cache."""
+def missing(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
+    """Names of those that are not in the cache, for any mechanism."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
-    return [name for name in kernels(options, params) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
+    return [name for name in kernels(options, params, mechanism) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
 
 
-def is_compiled(options: Options | None = None, params: NDArray[np.void] | None = None) -> bool:
+def is_compiled(
+    options: Options | None = None, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN
+) -> bool:
     """Whether the kernels that joints with `options` need, such as `params`, are in the cache."""
-    return not missing(options or Options(), params)
+    return not missing(options or Options(), params, mechanism)
 
 
-def warm_up(options: Options | None = None, params: NDArray[np.void] | None = None) -> None:
+def warm_up(
+    options: Options | None = None, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN
+) -> None:
     """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()
-    names = missing(options, params)
+    names = missing(options, params, mechanism)
     second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
-    with _compiling(second, options):
-        compile_kernels([name for name in names if name not in second], options)
-    compile_kernels(kernels(options, params), options)
+    with _compiling(second, options, mechanism):
+        compile_kernels([name for name in names if name not in second], options, mechanism)
+    compile_kernels(kernels(options, params, mechanism), options, mechanism)
 
 
-def compile_kernels(names: list[str], options: Options) -> None:
+def compile_kernels(names: list[str], options: Options, mechanism: Mechanism = CARDAN) -> None:
     """Compile or load these kernels of `KERNELS`."""
     for name in names:
-        KERNELS[name](options)
+        KERNELS[name](options, mechanism)
 
 
 @contextmanager
-def _compiling(names: list[str], options: Options) -> Iterator[None]:
+def _compiling(names: list[str], options: Options, mechanism: Mechanism) -> Iterator[None]:
     """Compile kernels into the cache in a second process; what fails there is compiled when it is called."""
     if not names:
         yield
         return
-    code = f"from {__name__} import *; compile_kernels({names!r}, Options{tuple(options)!r})"
+    called = f"compile_kernels({names!r}, Options{tuple(options)!r}, cardan.MECHANISMS[{mechanism.name!r}])"
+    code = f"from {__name__} import *; {called}"
     none = subprocess.DEVNULL
     with subprocess.Popen([sys.executable, "-c", code], stdin=none, stdout=none, stderr=none) as second:
         try:

@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import measure_of
-from tolstat.common.loads import LOADS, SHOWN_LOADS, FloatArray, Load, of_kind
+from tolstat.common.loads import FloatArray, Load, load_of, of_kind, shown_loads
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FINEST_STEPS, Fidelity, Options, Simulation, Status
 
 
@@ -57,6 +59,7 @@ def choose(
     simulate: Callable[..., Simulation],
     min_steps: int = 0,
     closed_form: bool = True,
+    mechanism: Mechanism = CARDAN,
 ) -> dict[str, Any]:
     """Choose a rung by a pilot of joints.
 
@@ -74,6 +77,8 @@ def choose(
         Largest error allowed.
     loads : sequence of str
         Loads asked for: ``cross1.F``, ``fork3.T``, ``pin1.contact``, ``psi``; all forces and torques if none.
+    mechanism : Mechanism
+        What the joints are.
     simulate : callable
         (n,) table PARAM, Options -> Simulation.
     min_steps : int
@@ -87,11 +92,12 @@ def choose(
         The choice and what was measured, as the result file keeps it: ``fidelity``, ``steps_per_rev``, whether they
         ``met`` the ``budget``, ``reason``, ``margin``, ``joints``, ``loads`` and, by rung, ``table``.
     """
-    names = tuple(loads) or SHOWN_LOADS
+    names = tuple(loads) or shown_loads(mechanism)
     truth = simulate(params, _at(options, REFERENCE)).results
     able = RUNGS if closed_form else [rung for rung in RUNGS if rung.fidelity != Fidelity.IDEAL]
     rungs = [rung for rung in able if rung.steps_per_rev >= min_steps]
-    table = [_entry(rung, simulate(params, _at(options, rung)).results, truth, names) for rung in rungs]
+    asked = [load_of(name, mechanism) for name in names]
+    table = [_entry(rung, simulate(params, _at(options, rung)).results, truth, asked) for rung in rungs]
     settled = [entry for entry in table if entry["differing"] == 0 and entry["worst"] is not None]
     good = [entry for entry in settled if MARGIN * entry["worst"] <= budget]
     best = min(good, key=lambda entry: float(entry["cost"]), default=table[-1])
@@ -144,10 +150,10 @@ def _at(options: Options, rung: Rung) -> Options:
     return options._replace(fidelity=int(rung.fidelity), steps_per_rev=rung.steps_per_rev)
 
 
-def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names: Sequence[str]) -> dict[str, Any]:
+def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], loads: Sequence[Load]) -> dict[str, Any]:
     """Error and cost of the pilot on one rung; the error is None if no joint settled."""
     settled = (results["status"] == Status.OK) & (truth["status"] == Status.OK)
-    errors = [_error(results[settled], truth[settled], LOADS[name]) for name in names]
+    errors = [_error(results[settled], truth[settled], load) for load in loads]
     return {
         "fidelity": rung.fidelity.name.lower(),
         "steps_per_rev": rung.steps_per_rev,

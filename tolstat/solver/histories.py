@@ -14,8 +14,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, SHAFT_LOADS, LoadHistory, Signal
-from tolstat.common.load_kinds import CONTACTS, SPAN
+from tolstat.common.cardan import CARDAN
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, Signal, components, load_histories
+from tolstat.common.load_kinds import CONTACTS, spans
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import HistorySpec, Options
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
@@ -29,7 +31,9 @@ MIN_SAMPLES = 90
 are within 1 %."""
 
 
-def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
+def history_specs(
+    options: Options, histories: Histories, n_harmonics: int, mechanism: Mechanism = CARDAN
+) -> dict[str, HistorySpec]:
     """Describe the load histories that are kept of each joint.
 
     Parameters
@@ -40,6 +44,8 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
         What is kept.
     n_harmonics : int
         Highest multiple of the input speed that ``"harmonics"`` keeps.
+    mechanism : Mechanism
+        What the joints are.
 
     Returns
     -------
@@ -47,18 +53,20 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     """
     n = options.steps_per_rev
     if histories == "full":
-        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
-        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
+        pins, of = len(mechanism.pairs), load_histories(mechanism)
+        contact = f"contact force of pins 1-{pins}: of the outermost station, of the innermost one, resultant of all "
+        contact += "stations"
+        modes = f"contact mode of pins 1-{pins}: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
-            "loads": _of_samples(BUSHING_LOADS, n),
-            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": _of_samples(SHAFT_LOADS, n),
-            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
+            "loads": _of_samples(of[BUSHING_LOADS], n),
+            "contact": HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
+            "shafts": _of_samples(of[SHAFT_LOADS], n),
+            "mode": HistorySpec((n, pins), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
-    specs = cycle_specs() if "cycles" in histories else {}
+    specs = cycle_specs(mechanism) if "cycles" in histories else {}
     if "harmonics" in histories:
-        specs |= harmonic_specs(min(n_harmonics, (n - 1) // 2) + 1)
+        specs |= harmonic_specs(min(n_harmonics, (n - 1) // 2) + 1, mechanism)
     return specs
 
 
@@ -67,25 +75,25 @@ def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
 
 
 def extracted(
-    samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]
+    samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec], mechanism: Mechanism = CARDAN
 ) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
-        fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
+        fields = {name: samples["loads"][:, span] for name, span in spans(mechanism).items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    pairs = zip(LOAD_HISTORIES, ("components", "shafts"), strict=True)
-    loads = {history.name: np.ascontiguousarray(samples[field]) for history, field in pairs}
-    sample = cycles(loads) if "cycles" in histories else {}
+    fields = {BUSHING_LOADS: samples["components"], SHAFT_LOADS: samples["shafts"]}
+    loads = {name: np.ascontiguousarray(values) for name, values in fields.items()}
+    sample = cycles(loads, mechanism) if "cycles" in histories else {}
     if "harmonics" in histories:
-        sample |= coefficients(loads, specs["coefficients_real"].shape[-1])
+        sample |= coefficients(loads, specs["coefficients_real"].shape[-1], mechanism)
     return sample
 
 
-def harmonic_specs(n_coefficients: int) -> dict[str, HistorySpec]:
+def harmonic_specs(n_coefficients: int, mechanism: Mechanism = CARDAN) -> dict[str, HistorySpec]:
     """Describe what `coefficients` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
-    for history in LOAD_HISTORIES:
+    for history in load_histories(mechanism).values():
         shape, axes = (*history.shape, n_coefficients), (*history.axes, "harmonic")
         text = f"part of the Fourier coefficients c_h: {history.meaning}; "
         text += "load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
@@ -98,25 +106,29 @@ def harmonic_specs(n_coefficients: int) -> dict[str, HistorySpec]:
     return result
 
 
-def coefficients(loads: Mapping[str, NDArray[np.float64]], n_coefficients: int) -> dict[str, NDArray[Any]]:
+def coefficients(
+    loads: Mapping[str, NDArray[np.float64]], n_coefficients: int, mechanism: Mechanism = CARDAN
+) -> dict[str, NDArray[Any]]:
     """Fourier coefficients of the loads of a joint.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
-        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m.
+        By name of `load_histories`, (samples, places, components) each, N and N m.
     n_coefficients : int
         Number of coefficients, the mean included.
+    mechanism : Mechanism
+        What the joints are.
 
     Returns
     -------
     dict
         By name of `specs`. Errors of all loads are relative to the largest bushing force and torque.
     """
-    bushing = loads[BUSHING_LOADS.name]
+    bushing = loads[BUSHING_LOADS]
     size = [np.linalg.norm(bushing[..., k : k + 3], axis=-1).max() for k in (0, 3)]
     coefficients: dict[str, NDArray[Any]] = {}
-    for history in LOAD_HISTORIES:
+    for history in load_histories(mechanism).values():
         values = loads[history.name]
         spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :n_coefficients]
         real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
@@ -147,10 +159,10 @@ def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.
     return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
 
 
-def cycle_specs() -> dict[str, HistorySpec]:
+def cycle_specs(mechanism: Mechanism = CARDAN) -> dict[str, HistorySpec]:
     """Describe what `cycles` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
-    for history in LOAD_HISTORIES:
+    for history in load_histories(mechanism).values():
         n, channel = math.prod(history.shape), f"{history.prefix}channel"
         text = "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are "
         text += "none; where none is counted, the first is the range of the load, up to the gate, and its middle; "
@@ -255,13 +267,15 @@ def between(
     return ranges, means, numbers, replaced[which.ravel()]
 
 
-def cycles(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def cycles(loads: Mapping[str, NDArray[Any]], mechanism: Mechanism = CARDAN) -> dict[str, NDArray[Any]]:
     """Rainflow cycles of all load components of a joint.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
         As in `count`, of all histories.
+    mechanism : Mechanism
+        What the joint is.
 
     Returns
     -------
@@ -269,11 +283,11 @@ def cycles(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         By name of `cycle_specs`, for each history: ``cycles`` (components, KEPT, 2), N and N m, and ``cycle_count``
         (components,). NaN and 0 when a load is not finite.
     """
-    described, kept, end = cycle_specs(), dict[str, NDArray[Any]](), 0
+    described, kept, end = cycle_specs(mechanism), dict[str, NDArray[Any]](), 0
     counted = None
     if all(np.isfinite(values).all() for values in loads.values()):
-        counted = count(loads, tuple(COMPONENTS.values()))
-    for history in LOAD_HISTORIES:
+        counted = count(loads, tuple(components(mechanism).values()), mechanism=mechanism)
+    for history in load_histories(mechanism).values():
         names = [f"{history.prefix}{name}" for name in ("cycles", "cycle_count")]
         table, number = (described[name].blank(1)[0] for name in names)
         begin, end = end, end + len(number)
@@ -285,17 +299,19 @@ def cycles(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 
 def count(
-    loads: Mapping[str, NDArray[Any]], signals: tuple[Signal, ...], kept: int = KEPT
+    loads: Mapping[str, NDArray[Any]], signals: tuple[Signal, ...], kept: int = KEPT, mechanism: Mechanism = CARDAN
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Rainflow cycles of some signals of a joint over one revolution.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
-        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m, finite. Those of bushings are
+        By name of `load_histories`, (samples, places, components) each, N and N m, finite. Those of bushings are
         needed: no cycle counts up to a fraction of their largest ones, see `GATE`.
     signals : tuple of Signal
         Signals, (c,).
+    mechanism : Mechanism
+        What the joint is.
     kept : int
         Maximum number of cycles of each, the largest ones.
 
@@ -309,11 +325,11 @@ def count(
     """
     from tolstat.kernel.revolution import rainflow
 
-    places, factors = _tables(signals)
-    bushing = loads[BUSHING_LOADS.name]
+    places, factors = _tables(signals, mechanism)
+    bushing = loads[BUSHING_LOADS]
     sizes = [np.linalg.norm(bushing[..., part].astype(float), axis=-1).max() for part in (slice(3), slice(3, 6))]
     gates = GATE * (np.abs(factors) @ np.repeat(sizes, 3))
-    histories = [loads[history.name] for history in LOAD_HISTORIES if history.name in loads]
+    histories = [loads[name] for name in load_histories(mechanism) if name in loads]
     values = np.ascontiguousarray(np.concatenate(histories, axis=1), dtype=float)
     ranges, means = np.empty((2, len(signals), kept))
     number = np.empty(len(signals), np.int64)
@@ -322,8 +338,8 @@ def count(
 
 
 @cache
-def _tables(signals: tuple[Signal, ...]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _tables(signals: tuple[Signal, ...], mechanism: Mechanism) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Place of each signal among those of all histories, and its factors, (signals, components)."""
-    names = [(history, place) for history in LOAD_HISTORIES for place in history.places]
+    names = [(history, place) for history in load_histories(mechanism).values() for place in history.places]
     places = [names.index((signal.history, signal.place)) for signal in signals]
     return np.array(places, np.int64), np.array([signal.factors for signal in signals])

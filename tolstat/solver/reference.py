@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
-from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
+from tolstat.common.load_kinds import kinds, measure_of, spans
 from tolstat.common.loads import FloatArray, put_largest
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import SIMULATED, Fidelity, Options, Start, Status
 from tolstat.solver.simulation import equilibrium, simulate_together
 
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -70,7 +71,9 @@ class FirstOrder(NamedTuple):
     settled: NDArray[np.void]
 
 
-def first_order(params: NDArray[np.void], options: Options, from_start: bool = False) -> FirstOrder:
+def first_order(
+    params: NDArray[np.void], options: Options, from_start: bool = False, mechanism: Mechanism = CARDAN
+) -> FirstOrder:
     """Simulate a joint until it settles, and return it as a first-order system that starts in the settled state.
 
     Parameters
@@ -79,6 +82,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         The joint.
     options : Options
         Numerical settings of that simulation; its fidelity is always dynamic.
+    mechanism : Mechanism
+        What the joint is.
     from_start : bool
         Start the system where the solver starts instead, at time zero.
 
@@ -95,9 +100,9 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
-    settled = np.zeros(1, RESULT)
+    settled = np.zeros(1, tables.tables(mechanism).RESULT)
     allowed = np.full(1, tables.iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, revolution),) = simulate_together(params, options, allowed, True, settled)
+    ((_, revolution),) = simulate_together(params, options, allowed, True, settled, mechanism=mechanism)
     period = 2 * np.pi / abs(float(par.omega))
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
@@ -107,8 +112,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
-    n = 2 * CARDAN.dof
-    works, scratch = np.zeros(1, work_dtype()), np.empty((3, n))
+    n = 2 * mechanism.dof
+    works, scratch = np.zeros(1, work_dtype(mechanism)), np.empty((3, n))
     work = works.view(np.recarray)[0]
     fast_rate = compiled_entry(kernel.rate_of_row, t0, y0, params, options, works, y0)
     fast_jacobian = compiled_entry(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
@@ -124,14 +129,14 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         return out
 
     def largest(times: FloatArray, states: FloatArray, equal: NDArray[np.bool_] | None = None) -> Largest:
-        samples = make_samples(1, len(times))[0]
+        samples = make_samples(1, len(times), mechanism)[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
-        out = tables.for_kernels(np.zeros(1, RESULT))[0]
+        out = tables.for_kernels(np.zeros(1, tables.tables(mechanism).RESULT), mechanism)[0]
         write_orders(par, samples if equal is None else samples[equal], out)
         out.largest[: samples.loads.shape[1]] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
-    scale = np.repeat([LENGTH, VELOCITY], CARDAN.dof)
+    scale = np.repeat([LENGTH, VELOCITY], mechanism.dof)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
 
 
@@ -143,6 +148,7 @@ def reference_rows(
     closure_tol: float = 1e-5,
     max_steps: int = MAX_STEPS,
     angles: int | None = None,
+    mechanism: Mechanism = CARDAN,
 ) -> NDArray[np.void]:
     """Solve joints with a tight tolerance from their settled state until their largest loads repeat.
 
@@ -154,6 +160,8 @@ def reference_rows(
         The joints.
     options : Options
         Numerical settings of the solver that gives the settled state.
+    mechanism : Mechanism
+        What the joints are.
     rtol : float
         Relative tolerance; the absolute one is `rtol` times `LENGTH` and `VELOCITY`.
     integrator : {"Radau", "BDF", "LSODA"}
@@ -174,26 +182,28 @@ def reference_rows(
         within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, or ``NEWTON_FAILED`` if the integration ended before the
         second revolution did.
     """
-    results = tables.without_results(len(params), Status.NEWTON_FAILED)
+    results = tables.without_results(len(params), Status.NEWTON_FAILED, mechanism)
     for i in range(len(params)):
-        system = first_order(params[i : i + 1], options)
+        system = first_order(params[i : i + 1], options, mechanism=mechanism)
         status = Status(system.settled["status"][0])
         if status in SIMULATED:
             revolutions = _revolutions(system, rtol, integrator, max_steps, angles)
-            status = _periodic(revolutions, closure_tol, results[i : i + 1])
+            status = _periodic(revolutions, closure_tol, mechanism, results[i : i + 1])
         results["status"][i] = status
     results["settled"] = results["status"] == Status.OK
     return results
 
 
-def _periodic(revolutions: Iterator[tuple[Largest, int]], closure_tol: float, out: NDArray[np.void]) -> Status:
+def _periodic(
+    revolutions: Iterator[tuple[Largest, int]], closure_tol: float, mechanism: Mechanism, out: NDArray[np.void]
+) -> Status:
     """Integrate until the largest loads repeat; write them and the work to `out`, (1,); return the status."""
     before = None
     for last, steps in revolutions:
         out["revolutions"], out["steps"] = 1 + np.nan_to_num(out["revolutions"]), steps
-        put_largest(last, out)
+        put_largest(last, out, mechanism)
         if before is not None:
-            out["closure"] = _change(before, last)
+            out["closure"] = _change(before, last, mechanism)
             if out["closure"][0] <= closure_tol:
                 return Status.OK
             if out["revolutions"][0] == MAX_REVS:
@@ -201,7 +211,7 @@ def _periodic(revolutions: Iterator[tuple[Largest, int]], closure_tol: float, ou
         before = last
     if np.isfinite(out["closure"][0]):
         return Status.NOT_SETTLED
-    put_largest(np.nan, out)
+    put_largest(np.nan, out, mechanism)
     return Status.NEWTON_FAILED
 
 
@@ -242,9 +252,11 @@ def _revolutions(
             return
 
 
-def _change(before: Largest, last: Largest) -> float:
+def _change(before: Largest, last: Largest, mechanism: Mechanism) -> float:
     """Largest change of any largest load that decides, relative to the largest of its measure."""
-    spans = [(SPAN[kind.key], SPAN[measure_of(kind).key]) for kind in LOAD_KINDS if kind.decides]
+    span, deciding = spans(mechanism), [kind for kind in kinds(mechanism).values() if kind.decides]
+    compared = [(span[kind.key], span[measure_of(kind).key]) for kind in deciding]
     return max(
-        float(np.abs(last[span] - before[span]).max() / max(last[measure].max(), 1e-300)) for span, measure in spans
+        float(np.abs(last[these] - before[these]).max() / max(last[measure].max(), 1e-300))
+        for these, measure in compared
     )

@@ -12,7 +12,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import LOAD_KINDS, measure_of
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import kinds, measure_of
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import SIMULATED, STEPS_PER_ITERATION, UNSETTLED, VALID, Fidelity, Method, Options, Status
 from tolstat.solver import stationary
 
@@ -58,7 +60,7 @@ def settings(options: Options) -> Options:
     return options._replace(method=int(Method.TR_BDF2), rtol=TOLERANCE, max_revs=revs)
 
 
-def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> None:
+def refine(results: NDArray[np.void], options: Options, simulate: Simulate, mechanism: Mechanism = CARDAN) -> None:
     """Repeat joints that need it with finer steps, until their largest loads change no more.
 
     Parameters
@@ -67,6 +69,8 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
         Joints as simulated with `options`; refined ones are overwritten.
     options : Options
         Numerical settings; steps are halved at most ``max_refinements`` times.
+    mechanism : Mechanism
+        What the joints are.
     simulate : callable
         Indices (m,) of joints, Options -> their results, (m,) table RESULT, and the statistics of the revolutions of
         each, (m, revolutions), see `kernel.lanes.lockstep`.
@@ -80,12 +84,12 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     if not rows.size:
         return
     refined, blocks = simulate(rows, settings(options))
-    stationary.classify(refined, blocks, options.duration)
+    stationary.classify(refined, blocks, options.duration, mechanism)
     known = np.isin(refined["status"], SIMULATED)
     for name in COUNTS:
         refined[name] += results[name][rows]
     refined["step_error"] = results["step_error"][rows]
-    agreed = (results["status"][rows] == Status.OK) & _agree(results[rows], refined)
+    agreed = (results["status"][rows] == Status.OK) & _agree(results[rows], refined, mechanism)
     if agreed.any():
         results[rows[agreed]], _ = simulate(rows[agreed], options)  # for the load histories of the uniform steps
     for name in COUNTS:
@@ -97,13 +101,13 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     results["status"][rows[far]] = Status.NOT_RESOLVED
 
 
-def _agree(plain: NDArray[np.void], refined: NDArray[np.void]) -> NDArray[np.bool_]:
+def _agree(plain: NDArray[np.void], refined: NDArray[np.void], mechanism: Mechanism) -> NDArray[np.bool_]:
     """Whether joints are stationary, with narrow intervals that contain the largest loads of the uniform steps.
 
     Loads that measure others are compared: those of the shafts may be next to nothing.
     """
     agree: NDArray[np.bool_] = refined["status"] == Status.STATIONARY
-    for key in dict.fromkeys(measure_of(kind).key for kind in LOAD_KINDS if kind.decides):
+    for key in dict.fromkeys(measure_of(kind).key for kind in kinds(mechanism).values() if kind.decides):
         lower, upper = refined[f"{key}_lower"], refined[f"{key}_upper"]
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = plain[f"{key}_max"].max(axis=1) / refined[f"{key}_max"].max(axis=1)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.parameters import numbers
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
@@ -39,14 +38,14 @@ UNIFORM_REVS = 4
 
 
 @cache
-def lanes(options: Options, width: int, mechanism: Mechanism) -> Batch:
+def lanes(options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
     """Work arrays of this process for `width` joints at a time; importing the kernel here spares light commands."""
     from tolstat.kernel.lanes.batch import make_batch
 
     return make_batch(options, width, mechanism)
 
 
-def blank_results(shape: int | tuple[int, ...], mechanism: Mechanism) -> Table:
+def blank_results(shape: int | tuple[int, ...], mechanism: Mechanism = CARDAN) -> Table:
     """Table RESULT of zeros; as statistics of single revolutions that are not needed, of shape (0, 0)."""
     return np.zeros(shape, tables.tables(mechanism).RESULT).view(np.recarray)
 
@@ -65,9 +64,9 @@ def width_for(joints: int) -> int:
 def simulate_rows(
     params: NDArray[np.void],
     options: Options,
-    mechanism: Mechanism,
     histories: Histories = "none",
     n_harmonics: int = 16,
+    mechanism: Mechanism = CARDAN,
 ) -> Simulation:
     """Simulate joints; row i of the result is joint i, and depends on no other row.
 
@@ -105,9 +104,7 @@ def simulate_rows(
         out, follows = blank_results(len(rows), mechanism), tables.follows_error(settings)
         blocks = blank_results((len(rows), settings.max_revs) if follows else (0, 0), mechanism)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
-        run = simulate_together(
-            params[rows], settings, still_allowed, bool(specs), out, mechanism, blocks, of_rows
-        )
+        run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows, mechanism)
         for i, samples in run:
             if out[i].status in SIMULATED:
                 for name, values in extracted(samples, histories, specs, mechanism).items():
@@ -123,7 +120,7 @@ def simulate_rows(
     others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
     if len(others):
         results[others], _ = simulate(others, options)
-    refinement.refine(results, options, mechanism, simulate)
+    refinement.refine(results, options, simulate, mechanism)
     results["newton_iterations"][(results["status"] == Status.NEWTON_FAILED) & (left <= 0)] = allowed
     stationary.fill_intervals(results, mechanism)
     results["clearance"] = params["clearance"]
@@ -136,9 +133,9 @@ def simulate_together(
     left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
-    mechanism: Mechanism,
     blocks: NDArray[np.void] | None = None,
     steps: NDArray[np.int64] | None = None,
+    mechanism: Mechanism = CARDAN,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
@@ -187,7 +184,7 @@ def make_queue(
     left: NDArray[np.int64],
     samples: Table,
     blocks: Table,
-    mechanism: Mechanism,
+    mechanism: Mechanism = CARDAN,
 ) -> Queue:
     """Make a queue of joints, see `kernel.lanes.batch.Queue`; their starts are computed."""
     from tolstat.kernel.lanes.batch import Queue
@@ -198,7 +195,7 @@ def make_queue(
     return Queue(rows, words, found, left, samples, blocks, tables.for_kernels(out, mechanism))
 
 
-def run_lanes(queue: Queue, options: Options, mechanism: Mechanism) -> NDArray[np.int64]:
+def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
     """Simulate the joints of a queue in lock-step; return the counts of `kernel.lanes.lockstep.lockstep`."""
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep, one_at_a_time
 
@@ -211,15 +208,14 @@ def run_lanes(queue: Queue, options: Options, mechanism: Mechanism) -> NDArray[n
     return tally
 
 
-def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism) -> Batch:
+def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width, mechanism)
-    for name in ("n_stations", "n_orders", *numbers(mechanism)):
-        batch.par[name] = queue.rows[name][0]
+    batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
     return batch
 
 
-def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.float64]:
+def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
     """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (dof,)."""
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
@@ -247,7 +243,7 @@ def _ideal(
             yield i, batch.samples[0]
 
 
-def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.float64]:
+def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
     """Where the search for the start of each joint begins, (n, dof), see `kernel.revolution.starts`.
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
@@ -260,14 +256,14 @@ def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism) -> ND
     return out
 
 
-def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> NDArray[np.int64]:
+def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
     """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
 
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
     steps = np.zeros(len(params), np.int64)
-    these = hitting(params, options) if len(mechanism.cardan) == 1 else np.zeros(0, np.intp)
+    these = hitting(params, options, mechanism)
     if not len(these):
         return steps
     from tolstat.kernel.lanes.explicit import count_steps
@@ -279,9 +275,9 @@ def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechan
     return steps
 
 
-def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
-    """Indices of the joints whose torque reverses, or nearly does, if they are to be refined."""
-    if not refinement.may_refine(options):
+def hitting(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.intp]:
+    """Indices of the Cardan joints whose torque reverses, or nearly does, if they are to be refined."""
+    if not refinement.may_refine(options) or mechanism != CARDAN:
         return np.zeros(0, np.intp)
     return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import Estimate
-from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import kinds, measure_of
 from tolstat.common.loads import FloatArray
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID, Status
 
 DISCARDED_SHARE = 1 / 3
@@ -44,7 +46,7 @@ STEP_ERROR = 0.01
 Table = NDArray[np.void]
 
 
-def classify(results: Table, blocks: Table, duration: int) -> None:
+def classify(results: Table, blocks: Table, duration: int, mechanism: Mechanism = CARDAN) -> None:
     """Set the status of stationary joints; write their largest loads and, by kind of load, the widest interval.
 
     Parameters
@@ -55,6 +57,8 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
         Statistics of their last revolutions, revolution r at r modulo their number.
     duration : int
         Number of revolutions whose largest loads are predicted.
+    mechanism : Mechanism
+        What the joints are.
     """
     for i in np.flatnonzero(results["status"] == Status.NOT_SETTLED):
         if results["period"][i] > 1:
@@ -63,10 +67,10 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
         made = int(results["revolutions"][i])
         stored = min(made, blocks.shape[1])
         watched = blocks[i, np.arange(made - stored, made) % blocks.shape[1]][int(DISCARDED_SHARE * stored) :]
-        if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched):
+        if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched, mechanism):
             continue
         results["status"][i] = Status.STATIONARY
-        for kind in SPAN:
+        for kind in kinds(mechanism):
             loads = results[f"{kind}_max"]
             median, lower, upper = largest(watched[f"{kind}_max"].reshape(len(watched), -1), duration)
             loads[i] = median.reshape(loads[i].shape)
@@ -74,32 +78,36 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
             results[f"{kind}_lower"][i], results[f"{kind}_upper"][i] = (lower / size).min(), (upper / size).max()
 
 
-def fill_intervals(results: Table) -> None:
+def fill_intervals(results: Table, mechanism: Mechanism = CARDAN) -> None:
     """Write the interval ends of joints that repeat, 1 (no uncertainty), and of joints without a valid load, NaN.
 
     Parameters
     ----------
     results : ndarray of RESULT, shape (n,)
         Joints; ends of stationary ones that never repeat are left as they are.
+    mechanism : Mechanism
+        What the joints are.
     """
     never = (results["status"] == Status.STATIONARY) & (results["period"] <= 1)
-    for kind in SPAN:
+    for kind in kinds(mechanism):
         for end in ("lower", "upper"):
             ends = results[f"{kind}_{end}"]
             ends[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 
-def is_stationary(watched: Table) -> bool:
+def is_stationary(watched: Table, mechanism: Mechanism = CARDAN) -> bool:
     """Whether the largest loads of both halves of the revolutions watched are alike, in mean and in spread.
 
     Parameters
     ----------
     watched : ndarray of RESULT, shape (revolutions,)
         Statistics of successive revolutions.
+    mechanism : Mechanism
+        What the joint is.
     """
     return all(
         _alike(_largest(watched, kind.key), float(_largest(watched, measure_of(kind).key).max()))
-        for kind in LOAD_KINDS
+        for kind in kinds(mechanism).values()
         if kind.decides
     )
 

@@ -145,8 +145,8 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
         ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `columns.drawn_columns`.
     """
     n, first, codes, groups = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
-    about = {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "mechanism": metadata.mechanism}
-    put_attributes(file, about | {"description": ABOUT})
+    about: dict[str, str | int | float] = {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION}
+    put_attributes(file, about | {"mechanism": metadata.mechanism, "description": ABOUT})
     documents.write(file, metadata)
     row = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
     for begin in range(0, n, BLOCK):

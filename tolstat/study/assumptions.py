@@ -11,14 +11,13 @@ from typing import Any, NamedTuple
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, input_error
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
+from tolstat.common.mechanism import Mechanism, features
 from tolstat.joint import derived
 from tolstat.joint.derived import get
 from tolstat.joint.model import leaves, merged, nested
 from tolstat.joint.reading import with_keys
 from tolstat.study.measured import left_open, of_entries
-from tolstat.study.selection import EXCLUDES, UNITS
+from tolstat.study.selection import error_units, excludes
 from tolstat.study.study import Study
 from tolstat.study.tolerances.zones import short_axes
 
@@ -174,21 +173,24 @@ def unselected(study: Study) -> tuple[str, ...]:
         return ()
     meanings = (meaning for entry in study.entries for site, model in entry.models for meaning in model.meaning(site))
     named = {name for meaning in meanings for name in meaning.errors} | study.errors.keys()
-    named |= {other for name in named for other in EXCLUDES.get(name, ()) if name.endswith(".clearance")}
-    return tuple(_groups([name for name in UNITS if name not in named]))
+    instead = excludes(study.mechanism)
+    named |= {other for name in named for other in instead.get(name, ()) if name.endswith(".clearance")}
+    return tuple(_groups([name for name in error_units(study.mechanism) if name not in named], study.mechanism))
 
 
-def _groups(names: Sequence[str]) -> Iterator[str]:
+def _groups(names: Sequence[str], mechanism: Mechanism) -> Iterator[str]:
     """Describe errors of pins and holes, those of alike features together."""
-    for part, every in (("pin", PINS), ("hole", HOLES)):
+    pins = {pair.pin for pair in mechanism.pairs}
+    for part in ("pin", "hole"):
+        every = [feature for feature in features(mechanism) if (feature in pins) == (part == "pin")]
         for noun, keys in _AXES.items():
             lacking = {feature: tuple(key for key in keys if f"{feature}.{key}" in names) for feature in every}
             for alike in filter(None, dict.fromkeys(lacking.values())):
-                features = [feature for feature in every if lacking[feature] == alike]
-                whole = len(features) == len(every)
-                listed = " and ".join(", ".join(features).rsplit(", ", 1))
+                those = [feature for feature in every if lacking[feature] == alike]
+                whole = len(those) == len(every)
+                listed = " and ".join(", ".join(those).rsplit(", ", 1))
                 what = f"{part} {noun}" if whole else f"{noun} of {listed}"
-                axes = f"the {part} axes" if whole else "their axes" if len(features) > 1 else "its axis"
+                axes = f"the {part} axes" if whole else "their axes" if len(those) > 1 else "its axis"
                 yield what if alike == keys else f"{what} {_along(alike, axes)}"
 
 
@@ -231,7 +233,7 @@ def _wide_bands(study: Study) -> Iterator[Fault]:
         sizes = []
         for site, model in entry.models:
             for meaning in model.meaning(site):
-                keys = {name.partition(".")[2] for name in meaning.errors}
+                keys = {name.rpartition(".")[2] for name in meaning.errors}
                 across = meaning.sigma if keys & {"offset_t", "offset_z"} else 0.0
                 sizes.append(0.5 * contact.z * meaning.sigma if keys & {"tilt_t", "tilt_z"} else across)
         ratio = max(sizes, default=0.0) / max(contact.clearance, LEAST_CLEARANCE)

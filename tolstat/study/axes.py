@@ -19,15 +19,16 @@ diameters of accepted parts then have a distribution of their own, `Bonus.accept
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
+from tolstat.common.mechanism import Mechanism, features
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class Bonus:
 
     def growth(self, deviation: Array) -> Array:
         """Radius of the zone over that without bonus, from the error of the diameter (m); both (n,)."""
-        side = 1.0 if self.diameter.startswith("pin") else -1.0
+        side = 1.0 if is_pin(self.diameter) else -1.0
         return np.maximum(1.0 + side * (self.limit - deviation) / (2.0 * self.radius), LEAST)
 
     def inside(self, growth: Array) -> Array:
@@ -121,42 +122,75 @@ PAIRS = {
     "input_holes": ("hole1", "hole2"),
     "output_holes": ("hole4", "hole3"),
 }
-"""Features on one ideal axis, pins of the cross or holes of a fork; e of the first one is x or y of its frame."""
+"""Features on one ideal axis of a Cardan joint, pins of the cross or holes of a fork; e of the first one is x or y of
+its frame. Where there are several joints, the name of the joint stands before each of these names: `members`."""
 
 ORIENTATIONS = ("perpendicularity", "angularity")
-ZONE_UNITS = (
-    {f"{name}.offset_radial": "m" for name in PINS + HOLES}
-    | {f"{name}.{key}": "m" for name in (*PINS, *HOLES, *PAIRS) for key in ("position", *ORIENTATIONS)}
-    | {f"{name}.coaxiality": "m" for name in PAIRS}
-)
-"""SI unit of what stands for several columns of the table ERROR: radial offsets, zones of features and of pairs."""
+RADIAL = "offset_radial"
+ZONES = ("position", *ORIENTATIONS, "coaxiality")
+"""Keys of zones, beside that of radial offsets."""
+
+
+@cache
+def zone_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of what stands for several columns of the table ERROR: radial offsets, zones of features and of pairs."""
+    single = features(mechanism)
+    joints = dict.fromkeys(feature[: -len(own(feature))] for feature in single)
+    pairs = [f"{joint}{pair}" for joint in joints for pair in PAIRS]
+    names = [f"{feature}.{RADIAL}" for feature in single]
+    names += [f"{feature}.{key}" for feature in (*single, *pairs) for key in ("position", *ORIENTATIONS)]
+    return dict.fromkeys([*names, *(f"{pair}.coaxiality" for pair in pairs)], "m")
+
+
+def own(feature: str) -> str:
+    """Name of a feature or pair in its joint: ``pin1`` of ``joint2.pin1``."""
+    return feature.rpartition(".")[2]
+
+
+def is_pair(feature: str) -> bool:
+    """Whether a name is that of a pair of features."""
+    return own(feature) in PAIRS
+
+
+def is_pin(name: str) -> bool:
+    """Whether an error is one of a pin, not of a hole."""
+    return own(name.rpartition(".")[0]).startswith("pin")
+
+
+def members(feature: str) -> tuple[str, ...]:
+    """Features of a pair; a feature itself."""
+    joint = feature[: -len(own(feature))]
+    return tuple(f"{joint}{name}" for name in PAIRS.get(own(feature), (own(feature),)))
+
+
+def alike(feature: str) -> str:
+    """Pattern of all features of the kind of one: ``pin*``, ``joint*.pin*``."""
+    return re.sub(r"\d+", "*", feature)
 
 
 def is_zone(name: str) -> bool:
     """Whether a name is that of a zone, or of a quantity that a zone draws."""
-    return zone_of(name) in ZONE_UNITS
+    return own(zone_of(name)) in (RADIAL, *ZONES)
 
 
 def zone_of(name: str) -> str:
     """Name of the zone that draws a quantity: ``pin1.position`` of ``pin1.position_inner``."""
-    if name in ZONE_UNITS:
-        return name
-    feature, _, key = name.partition(".")
-    return f"{feature}.{key.partition('_')[0]}"
+    feature, _, key = name.rpartition(".")
+    return name if key == RADIAL else f"{feature}.{key.partition('_')[0]}"
 
 
 def compatible(first: str, other: str) -> bool:
     """Whether two zones are tolerances of one axis that complement each other, such as position and coaxiality."""
-    (a, _, key), (b, _, other_key) = first.partition("."), other.partition(".")
+    (a, _, key), (b, _, other_key) = first.rpartition("."), other.rpartition(".")
     roles = [next((r for r in ORIENTATIONS if k in ORIENTATIONS), k) for k in (key, other_key)]
-    known = is_zone(first) and is_zone(other) and "offset_radial" not in roles
+    known = is_zone(first) and is_zone(other) and RADIAL not in roles
     return known and a == b and roles[0] != roles[1]
 
 
 def ends(name: str) -> tuple[str, str]:
     """Keys of the ends of an axis at -over/2 and +over/2 along e."""
-    if name in PAIRS:
-        first, second = PAIRS[name]
+    if is_pair(name):
+        first, second = PAIRS[own(name)]
         return f"position_{second}", f"position_{first}"
     return "position_inner", "position_outer"
 
@@ -165,26 +199,31 @@ def columns_of(name: str) -> tuple[str, ...]:
     """Columns of the table ERROR that hold a quantity or zone."""
     if not is_zone(name):
         return (name,)
-    feature, _, key = name.partition(".")
-    parts = ["offset_t", "offset_z"] if key == "offset_radial" else ["tilt_t", "tilt_z"]
-    if feature in PAIRS or key.startswith("position"):
+    feature, _, key = name.rpartition(".")
+    parts = ["offset_t", "offset_z"] if key == RADIAL else ["tilt_t", "tilt_z"]
+    if is_pair(feature) or key.startswith("position"):
         parts = ["offset_t", "offset_z", "tilt_t", "tilt_z"]
-    return tuple(f"{member}.{part}" for member in PAIRS.get(feature, (feature,)) for part in parts)
+    return tuple(f"{member}.{part}" for member in members(feature) for part in parts)
 
 
 def streams_of(name: str) -> tuple[str, ...]:
     """Columns of the table ERROR whose random streams a quantity uses: of a vector for radius and direction."""
     if not is_zone(name):
         return (name,)
-    feature, _, key = name.partition(".")
-    first, second = PAIRS.get(feature, (feature, feature))
+    feature, _, key = name.rpartition(".")
+    first, second = members(feature)[0], members(feature)[-1]
     if key.startswith("coaxiality"):
-        source, part = key.rpartition("_")[2], "tilt"
-    elif key in ("offset_radial", "position") or key == ends(feature)[0]:
+        source, part = _member(feature, key), "tilt"
+    elif key in (RADIAL, "position") or key == ends(feature)[0]:
         source, part = first, "offset"
     else:
-        source, part = second, "offset" if feature in PAIRS else "tilt"
+        source, part = second, "offset" if is_pair(feature) else "tilt"
     return tuple(f"{source}.{part}_{c}" for c in (key[-1] if is_component(name) else "tz"))
+
+
+def _member(pair: str, key: str) -> str:
+    """Feature of a pair that a key of its coaxiality is about: ``coaxiality_pin1``."""
+    return pair[: -len(own(pair))] + key.rpartition("_")[2]
 
 
 def is_component(name: str) -> bool:
@@ -237,30 +276,31 @@ class Axis:
             deviation = table[self.bonus.diameter]
             drawn = {key: self.bonus.shift(vector, deviation) for key, vector in drawn.items()}
         middle, slope = self._line(drawn)
-        if self.name not in PAIRS:
+        if not is_pair(self.name):
             _set(table, self.name, middle, slope)
             return
-        relatives = [drawn.get(f"coaxiality_{feature}") for feature in PAIRS[self.name]]
+        both = members(self.name)
+        relatives = [drawn.get(f"coaxiality_{own(feature)}") for feature in both]
         zero = np.zeros((2, len(table)))
         common, tilt = zero if middle is None else middle, zero if slope is None else slope
-        for feature, relative, side in zip(PAIRS[self.name], relatives, (1.0, -1.0), strict=True):
+        for feature, relative, side in zip(both, relatives, (1.0, -1.0), strict=True):
             shift, turned = _as_seen(common + side * self.reach * tilt, tilt, side)
             _set(table, feature, shift, turned if relative is None else turned + relative)
 
     def vector(self, errors: Table, key: str) -> Array:
         """Vector of one key from the errors of joints, the inverse of `fill`; (2, n), m or slope."""
-        if self.name not in PAIRS:
-            if key == "offset_radial":
+        if not is_pair(self.name):
+            if key == RADIAL:
                 return _offset(errors, self.name)
             slope = _slope(errors, self.name)
             drawn = self._of_line(key, slope, lambda: _offset(errors, self.name))
             return drawn if self.bonus is None else self.bonus.unshift(drawn, errors[self.bonus.diameter])
-        first, second = PAIRS[self.name]
+        first, second = members(self.name)
         near = _offset(errors, first)
         far, _ = _as_seen(_offset(errors, second), np.zeros((2, 1)), -1.0)
         slope = (near - far) / (2.0 * self.reach)
         if key.startswith("coaxiality"):
-            member = key.rpartition("_")[2]
+            member = _member(self.name, key)
             return _slope(errors, member) - _as_seen(near, slope, 1.0 if member == first else -1.0)[1]
         return self._of_line(key, slope, lambda: 0.5 * (near + far))
 
@@ -273,7 +313,7 @@ class Axis:
         for key, vector in drawn.items():
             if key.startswith(ORIENTATIONS):
                 slope = vector if slope is None else slope + vector
-        middle = drawn.get("offset_radial", drawn.get("position"))
+        middle = drawn.get(RADIAL, drawn.get("position"))
         if middle is not None and slope is not None and "position" in drawn:
             middle = middle * self._share_left(slope)
         return middle, slope

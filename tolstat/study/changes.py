@@ -14,6 +14,7 @@ from typing import Any
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import varied
 from tolstat.joint.derived import replaced
@@ -22,7 +23,7 @@ from tolstat.joint.reading import with_keys
 from tolstat.study import rewriting, scaling, selection, widths
 from tolstat.study.file import BESIDE_FIT, SECTIONS, load
 from tolstat.study.scaling import REPLACED_KEYS
-from tolstat.study.selection import TOLERANCED
+from tolstat.study.selection import halves, toleranced_units
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits
 
@@ -37,7 +38,7 @@ DIGITS = 10
 NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
 """A number in JSON, or in a text there that is a quantity."""
 NAMES = 2
-"""Number of parts of the name of an error: ``pin1.tilt_t``."""
+"""Number of parts of a key of an operating point or fit, and of the name of an error of one joint: ``pin1.tilt_t``."""
 
 
 def with_settings(study: Study, settings: Sequence[str]) -> str:
@@ -75,7 +76,7 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
                 if (other := places.setdefault(tuple(path), place)) is not place:
                     raise input_error(place, f"sets the key of {other} again", "remove one of the two")
                 if path[0] in SETTABLE:
-                    text = _set(text, path, value, place)
+                    text = _set(text, path, value, place, study.mechanism)
                 elif path[0] == fits.KEY and len(path) == NAMES:
                     text = rewriting.with_keys(text, {fits.PATH: {path[1]: value}}, place)
                 else:
@@ -110,7 +111,7 @@ def words(study: Study, text: str) -> str:
     """What a text changes: keys with their values before and after, entries that are gone, and new ones."""
     old, new = (_flat(tomllib.loads(each)) for each in (study.text, text))
     values = [f"{key} {old[key]} → {value}" for key, value in new.items() if key in old and old[key] != value]
-    gone, added = (list(dict.fromkeys(_shown(key) for key in a.keys() - b.keys())) for a, b in ((old, new), (new, old)))
+    gone, added = ({_shown(key, study.mechanism) for key in a.keys() - b.keys()} for a, b in ((old, new), (new, old)))
     found = {"changed": values, "without": sorted(gone), "new": sorted(added)}
     return "; ".join(f"{word}: {', '.join(items)}" for word, items in found.items() if items)
 
@@ -123,9 +124,15 @@ def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
     return leaves(sections) | leaves(data["tolerances"])
 
 
-def _shown(key: str) -> str:
+def _shown(key: str, mechanism: Mechanism) -> str:
     """Key of the joint or the operation; of a tolerance its entry."""
-    return key if key.partition(".")[0] in SETTABLE else ".".join(key.split(".")[:NAMES])
+    path = key.split(".")
+    return key if path[0] in SETTABLE else ".".join(path[: _names(path, mechanism)])
+
+
+def _names(path: Sequence[str], mechanism: Mechanism) -> int:
+    """Number of parts of the pattern that a key begins with: a joint before feature and key is one more."""
+    return NAMES + any(fnmatchcase(joint, path[0]) for joint in selection.joints(mechanism))
 
 
 def read(study: Study, text: str) -> Study:
@@ -188,7 +195,7 @@ def _parsed(setting: str, place: str) -> tuple[list[str], Any]:
     return path[1:] if path[0] == "tolerances" else path, value
 
 
-def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
+def _set(text: str, path: Sequence[str], value: Any, place: str, mechanism: Mechanism) -> str:
     """Set a key of the joint, of an operating point or of a fixed error."""
     section = tomllib.loads(text).get(path[0])
     if path[0] == "operation" and isinstance(section, list):
@@ -200,7 +207,7 @@ def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
         return rewriting.with_keys(text, {table: {".".join(path[2:]): value}}, place)
     if path[0] == "errors":
         pattern = ".".join(path[1:])
-        for entry in selection.entries(section or {}, "errors"):
+        for entry in selection.entries(section or {}, mechanism, "errors"):
             if entry.pattern == pattern:
                 return rewriting.with_keys(text, {entry.path[:-1]: {str(entry.path[-1]): value}}, place)
         return rewriting.with_path(text, ["errors", pattern], value, place)
@@ -220,8 +227,9 @@ class _Entries:
 
     def set(self, path: Sequence[str], value: Any, place: str) -> None:
         """Change a key of some errors, or their whole entry."""
-        pattern, key = ".".join(path[:NAMES]), path[NAMES:]
-        known: Iterable[str] = self._keys if key or value == NONE else TOLERANCED
+        count = _names(path, self._study.mechanism)
+        pattern, key = ".".join(path[:count]), path[count:]
+        known: Iterable[str] = self._keys if key or value == NONE else toleranced_units(self._study.mechanism)
         names = selection.select(pattern, known)
         if key or value == NONE:
             names += [name for name in self._of_entries(pattern) if name in self._keys and name not in names]
@@ -243,9 +251,9 @@ class _Entries:
 
     def _of_entries(self, pattern: str) -> list[str]:
         """Names of the entries whose own pattern a pattern selects: ``*_holes.position`` by ``*.position``."""
-        feature, _, key = pattern.partition(".")
-        parts = {of_entry: of_entry.partition(".") for of_entry in self._patterns}
-        chosen = [of_entry for of_entry, (own, _, its) in parts.items() if its == key and fnmatchcase(own, feature)]
+        feature, key = halves(pattern)
+        parts = {of_entry: halves(of_entry) for of_entry in self._patterns}
+        chosen = [of_entry for of_entry, (own, its) in parts.items() if its == key and fnmatchcase(own, feature)]
         return [name for of_entry in chosen for name in self._patterns[of_entry]]
 
     def written(self, text: str) -> str:
@@ -258,11 +266,14 @@ class _Entries:
                 is_alike = each[0] is not None and all(other == each[0] for other in each)
                 alike[pattern] = dict(each[0] or {}) if is_alike else self._written[pattern]
                 parted += [] if is_alike else [pattern]
-        if alike.keys() & {fits.HOLE, fits.PIN} and _fit(text) != _fit(self._study.text):
+        if alike.keys() & set(fits.patterns(self._study.mechanism)) and _fit(text) != _fit(self._study.text):
             raise input_error("--set fit", "is given beside tolerances of diameters", "leave one of the two out")
         if alike:
             text = scaling.rewritten(self._study, alike, self._study.sampling.seed, text)
-        paths = {entry.pattern: entry.path for entry in fits.entries(tomllib.loads(text)["tolerances"], None)}
+        paths = {
+            entry.pattern: entry.path
+            for entry in fits.entries(tomllib.loads(text)["tolerances"], None, self._study.mechanism)
+        }
         changes: dict[tuple[int | str, ...], dict[str, Any]] = {("tolerances",): {}}
         for pattern in parted:
             *table, key = paths[pattern]

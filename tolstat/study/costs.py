@@ -19,6 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.files import finite, read_input
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
@@ -107,13 +108,15 @@ class Cost(NamedTuple):
             return False
 
 
-def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
+def of(tolerances: Sequence[Tolerance], mechanism: Mechanism, path: Path | None = None) -> list[Cost]:
     """Cost of each tolerance.
 
     Parameters
     ----------
     tolerances : sequence of Tolerance
         Tolerances of the study.
+    mechanism : Mechanism
+        Whose errors they are of.
     path : Path, optional
         TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or CSV file with a
         column ``tolerance`` of such names and the entries' keys as further columns. A feature is named by one of the
@@ -136,9 +139,9 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     tolerance_of = {name: tolerance for tolerance in tolerances for name in tolerance.names}
     costs: dict[str, CostEntry] = {}
     faults: list[Fault] = []
-    claims = selection.Assignments(str(path))
+    claims = selection.Assignments(str(path), mechanism)
     known = {name: tolerance.site.unit for name, tolerance in tolerance_of.items()}
-    for entry in selection.entries(table):
+    for entry in selection.entries(table, mechanism):
         with gather(faults):
             names = selection.resolve(entry, known, str(path))
             claims.claim(entry, names)
@@ -160,7 +163,7 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
 
 def features(tolerance: Tolerance) -> list[str]:
     """Features that a tolerance applies to: pins, holes, pairs of holes."""
-    return list(dict.fromkeys(name.partition(".")[0] for name in tolerance.names))
+    return list(dict.fromkeys(name.rpartition(".")[0] for name in tolerance.names))
 
 
 def _of_features(
@@ -169,7 +172,7 @@ def _of_features(
     """Entry of each feature of a tolerance; several errors of it may have one entry only."""
     found: dict[str, CostEntry] = {}
     for name in tolerance.names:
-        feature = name.partition(".")[0]
+        feature = name.rpartition(".")[0]
         entry = costs.get(name)
         if entry is not None and found.setdefault(feature, entry) != entry:
             remedy = "give one for all errors of the tolerance: it is one width on the drawing"

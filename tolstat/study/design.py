@@ -17,6 +17,7 @@ from tolstat.common.late import stats
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation, affects_results
 from tolstat.joint.sections import quantities
+from tolstat.study.axes import own
 from tolstat.study.model import Solver, SweepAxis
 
 IDEAL = "ideal"
@@ -108,8 +109,8 @@ def meaning(axes: Sequence[SweepAxis], joint: Joint) -> list[str]:
     keys = {"clearance": "clearance"} | {f"{part}.diameter": key for part, key in (("hole", "D_H"), ("pin", "D_P"))}
     lines = []
     for axis in axes:
-        part, _, kind = axis.names[0].partition(".")
-        key = keys.get(kind) or keys.get(f"{part.rstrip('1234')}.{kind}")
+        feature, _, kind = axis.names[0].rpartition(".")
+        key = keys.get(kind) or keys.get(f"{own(feature).rstrip('1234')}.{kind}")
         if axis.names[0] not in KEYS and key is not None:
             ends = (f"{1e3 * end:.6g}" for end in (axis.start, axis.stop))
             whole = (f"{1e3 * (getattr(of, key) + end):.6g}" for end in (axis.start, axis.stop))

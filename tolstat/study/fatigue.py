@@ -13,9 +13,10 @@ from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, fiel
 
 from tolstat.analysis.strength import Line
 from tolstat.common import units
-from tolstat.common.channels import BUSHING_LOADS, CHANNELS, COMPONENTS, PLANES, WORST, Channel, unit_of
+from tolstat.common.channels import FORCES_AND_TORQUES, WORST, Channel, channels, components, planes, unit_of
 from tolstat.common.errors import gather, input_error
-from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.load_kinds import kinds as kinds_of
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.strict import Strict, did_you_mean, dotted, read_section, read_toml, refuse
 from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, select, suggestion
@@ -31,19 +32,13 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
-def _check_bushing(bushing: str) -> str:
-    if not select(bushing, BUSHINGS):
-        raise refuse(f"{bushing!r} is not a bushing", did_you_mean(bushing, BUSHINGS))
-    return bushing
-
-
 class StressPointEntry(Strict):
     """Point of a part: its stress is a sum of the bushing's load components, each times a factor.
 
     A round section has no one point where bending about two axes is largest: it is evaluated all around.
     """
 
-    bushing: Annotated[str, AfterValidator(_check_bushing)] = Field(examples=["fork*"])
+    bushing: str = Field(examples=["fork*"])
     """bushing whose load stresses the point, or pattern of several"""
     F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
     """stress at the point by the force along e of the bushing"""
@@ -97,8 +92,8 @@ class StressPointEntry(Strict):
 
     @property
     def per_load(self) -> tuple[tuple[float, ...], ...]:
-        """Stress per load component at each place, in the order of `BUSHING_LOADS`, 1/m^2 and 1/m^3."""
-        names = BUSHING_LOADS.components
+        """Stress per load component at each place, in the order of `FORCES_AND_TORQUES`, 1/m^2 and 1/m^3."""
+        names = FORCES_AND_TORQUES
         factors = np.array([float(getattr(self, name)) for name in names])
         bent = {pair: value for name, pair in ROUND.items() if (value := float(getattr(self, name)))}
         places = []
@@ -129,7 +124,7 @@ class StressPoint(NamedTuple):
     name : str
         Name in the study; with the bushing where the study names several.
     bushing : str
-        One of `load_kinds.BUSHINGS`.
+        Name of a bushing.
     per_load : tuple of tuple of float
         Stress per load component along e, t, z, three forces, 1/m^2, and three torques, 1/m^3: at one place or, of a
         round section, at several around it, of which the part fails at the worst.
@@ -285,29 +280,33 @@ def read(file: Reading) -> Fatigue:
     table, settings = file.data.get("fatigue", {}), Settings()
     of_channels = table.get("line") if isinstance(table, Mapping) else None
     lines: dict[str, tuple[float, float, float]] = {}
-    claims, names = Assignments(file.place), [point.name for point in file.points or ()]
+    claims, names = Assignments(file.place, file.mechanism), [point.name for point in file.points or ()]
     with gather(file.faults):
         settings = file.model(Settings, table, "fatigue")
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
         file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
     _check_visits(file, visits, settings.sequence)
-    for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, "fatigue", "line"):
+    for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, file.mechanism, "fatigue", "line"):
         with gather(file.faults):
-            selected = counted_names(entry, file.place)
+            selected = counted_names(entry, file.place, file.mechanism)
             claims.claim(entry, selected)
-            if len(kinds := sorted({unit_of(name) for name in selected})) > 1:
+            if len(kinds := sorted({unit_of(name, file.mechanism) for name in selected})) > 1:
                 found = f"selects quantities of different kinds ({', '.join(kinds)})"
                 raise input_error(f"{file.place}: {dotted(entry.path)}", found, "write one entry for each kind")
             line = file.model(LineEntry, entry.value, *entry.path)
             size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
-            value = quantity(size, unit_of(selected[0]), file.place)
+            value = quantity(size, unit_of(selected[0], file.mechanism), file.place)
             if value <= 0:
                 file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
             lines |= dict.fromkeys(selected, (line.m, value, line.N0))
     points = []
     for name, point in settings.point.items():
-        bushings = select(point.bushing, BUSHINGS)
+        places = kinds_of(file.mechanism)["F"].places
+        bushings = select(point.bushing, places)
+        if not bushings:
+            remedy = did_you_mean(point.bushing, places)
+            file.fault(("fatigue", "point", name, "bushing"), f"{point.bushing!r} is not a bushing", remedy)
         for bushing in bushings:
             own = name if len(bushings) == 1 else f"{name}, {bushing}"
             points.append(StressPoint(own, bushing, point.per_load, point.line))
@@ -337,7 +336,7 @@ def _check_visits(file: Reading, visits: Sequence[str], sequence: SequenceEntry 
             file.fault("fatigue.sequence.revolutions", found, remedy)
 
 
-def counted_names(entry: Entry, place: str) -> list[str]:
+def counted_names(entry: Entry, place: str, mechanism: Mechanism) -> list[str]:
     """Names that an entry selects of what cycles are counted of: components, or directions of a force or moment.
 
     Parameters
@@ -346,6 +345,8 @@ def counted_names(entry: Entry, place: str) -> list[str]:
         Its pattern is ``cross*.F_t``, ``cross1.F at 30 deg`` or ``output.moment at worst``, see `channels.signals_of`.
     place : str
         File name shown in faults.
+    mechanism : Mechanism
+        Whose loads they are.
 
     Raises
     ------
@@ -353,12 +354,12 @@ def counted_names(entry: Entry, place: str) -> list[str]:
         When it selects nothing, or a modulus.
     """
     plane, at, direction = (part.strip() for part in entry.pattern.partition(" at "))
-    where, names = f"{place}: {dotted(entry.path)}", PLANES if at else COMPONENTS
-    selected = select(plane, names)
-    unsigned = [channel for name in select(plane, CHANNELS) if (channel := CHANNELS[name]).is_modulus]
+    where, names = f"{place}: {dotted(entry.path)}", planes(mechanism) if at else components(mechanism)
+    selected, every = select(plane, names), channels(mechanism)
+    unsigned = [channel for name in select(plane, every) if (channel := every[name]).is_modulus]
     if not selected and unsigned and not at:
         found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
-        raise input_error(where, found, _signed(unsigned[0]))
+        raise input_error(where, found, _signed(unsigned[0], mechanism))
     if not selected:
         raise input_error(where, "selects nothing", suggestion(plane, list(names)))
     if not at:
@@ -369,10 +370,12 @@ def counted_names(entry: Entry, place: str) -> list[str]:
     return [f"{name} at {direction}" for name in selected]
 
 
-def _signed(modulus: Channel) -> str:
+def _signed(modulus: Channel, mechanism: Mechanism) -> str:
     """Remedy for a modulus: its components, and directions where it has several."""
     components = [f"{modulus.place}.{name}" for name in modulus.history.components[modulus.components]]
-    directions = f', or "{modulus.name} at 30 deg", "{modulus.name} at {WORST}"' if modulus.name in PLANES else ""
+    directions = (
+        f', or "{modulus.name} at 30 deg", "{modulus.name} at {WORST}"' if modulus.name in planes(mechanism) else ""
+    )
     return f"write {', '.join(components)}{directions}"
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, collected, gather, input_error
-from tolstat.common.loads import LOADS, UNIT_OF_LIMIT, load_of, split
+from tolstat.common.errors import Fault, collected, gather, input_error, raise_all
+from tolstat.common.loads import load_of, loads_of, split, units_of_limits
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import Joint, reading
+from tolstat.joint import Joint, Series, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -25,12 +25,12 @@ from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.points import Point
-from tolstat.study.selection import TOLERANCED, Assignments, Reading
+from tolstat.study.selection import Assignments, Reading, toleranced_units
 from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "solver", "errors")
+OF_CASE = ("joint", "operation", "series", "solver", "errors")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
@@ -94,9 +94,9 @@ def _sampling(file: Reading) -> Sampling | None:
 def _scatter(file: Reading) -> Tolerances:
     """``[tolerances]``: how errors scatter."""
     written = []
-    for entry in fits.entries(file.table("tolerances"), file.fit):
+    for entry in fits.entries(file.table("tolerances"), file.fit, file.mechanism):
         with gather(file.faults):
-            selected = selection.resolve(entry, TOLERANCED, file.place)
+            selected = selection.resolve(entry, toleranced_units(file.mechanism), file.place)
             with gather(file.faults):
                 file.claims.claim(entry, selected)
             written.append((entry, selected))
@@ -106,13 +106,13 @@ def _scatter(file: Reading) -> Tolerances:
 def _limits(file: Reading) -> dict[str, float]:
     """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
     limits: dict[str, float] = {}
-    claims = Assignments(file.place)
+    claims, units = Assignments(file.place, file.mechanism), units_of_limits(file.mechanism)
     names_of_points = [point.name for point in file.points]
     for entry in file.entries("limits"):
         with gather(file.faults):
             pattern, where = split(entry.pattern)
-            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LIMIT, file.place)
-            value = selection.quantity(entry, UNIT_OF_LIMIT[names[0]], file.place)
+            names = selection.resolve(entry._replace(pattern=pattern), units, file.place)
+            value = selection.quantity(entry, units[names[0]], file.place)
             if names_of_points:  # if not, the points have faults of their own
                 chosen = points.names_of(where, names_of_points, f"{file.place}: {dotted(entry.path)}")
                 names = [points.at(name, chosen, names_of_points) for name in names]
@@ -121,6 +121,15 @@ def _limits(file: Reading) -> dict[str, float]:
                 file.fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
             limits |= dict.fromkeys(names, value)
     return limits
+
+
+def _output(file: Reading) -> Output:
+    """``[output]``."""
+    output = file.model(Output, file.data.get("output", {}), "output")
+    raise_all(
+        Fault(f"{file.place}: output.results[{number}]", *texts) for number, *texts in output.unknown(file.mechanism)
+    )
+    return output
 
 
 def _listed(file: Reading) -> Design | None:
@@ -132,6 +141,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "fit": fits.read,
     "joint": _joint,
     "assumed": _assumed,
+    "series": lambda file: file.model(Series, file.data["series"], "series") if "series" in file.data else None,
     "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
     "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
@@ -142,7 +152,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "sweep": listing.axes_of_sweep,
     "limits": _limits,
     "fatigue": fatigue.read,
-    "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
+    "output": _output,
     "listed": _listed,
     "swept": listing.swept,
 }
@@ -202,8 +212,8 @@ def _check_points(file: Reading, sampling: Sampling) -> None:
 
 def _check_output(file: Reading, output: Output) -> None:
     """Note limits of loads that are not stored."""
-    stored = {column.name for column in output.columns}
-    lacking = [name for load in file.limits for name in load_of(load).columns if name not in stored]
+    stored = {column.name for column in output.columns(file.mechanism)}
+    lacking = [name for load in file.limits for name in load_of(load, file.mechanism).columns if name not in stored]
     if lacking:
         found = f"leaves out columns that [limits] needs: {', '.join(lacking)}"
         file.fault("output.results", found, "add these columns, or remove their limits")
@@ -267,7 +277,7 @@ def load(
     whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
-        parts = {name: part for name, part in file.parts.items() if name != "scatter"}
+        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "series")}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
         study = Study(file.path, file.text, **parts)
         with gather(file.faults):
@@ -295,7 +305,7 @@ def load_case(path: str | Path) -> Study:
     file = Reading(Path(path), OF_CASE)
     if "sampling" in file.data:
         raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
-    _read(file, ["joint"])
+    _read(file, ["joint", "series"])
     with gather(file.faults):
         file.parts["operation"] = points.operation(file)
     _read(file, ["solver", "errors"])
@@ -337,8 +347,8 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         if not study.tolerances:
             remedy = 'give a study with [tolerances] and sampling.method = "random"'
             faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
-        for load in (LOADS[name] for name in sampling["levels"]):
-            if not holds(study.output.columns, load.name):
+        for load in (loads_of(study.mechanism)[name] for name in sampling["levels"]):
+            if not holds(study.columns, load):
                 found, remedy = f"leaves out {load.name}, which --limit needs", f"add {', '.join(load.columns)}"
                 faults.append(study.fault("output.results", found, remedy))
         kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))

@@ -77,7 +77,7 @@ class Ladder(NamedTuple):
 
 def ladders(study: Study, tolerances: Sequence[Tolerance], costs: Sequence[Cost]) -> list[Ladder]:
     """Ladder of each line that may change, in the order of the study; the two diameters of a fit are one line."""
-    found, of_fit = [], {fits.HOLE, fits.PIN} if study.fit is not None else set()
+    found, of_fit = [], set(fits.patterns(study.mechanism)) if study.fit is not None else set()
     lines = {line.label for line in widths.lines(study)}
     for tolerance, cost in zip(tolerances, costs, strict=True):
         if tolerance.pattern in lines - of_fit and cost.reach[0] < cost.reach[1]:
@@ -161,7 +161,7 @@ def _of_fit(study: Study, both: Sequence[tuple[Tolerance, Cost]]) -> Ladder:
             except ValueError:  # the tables end here
                 return
             halves = (new.half / old.half for new, old in zip(zones, entry.zones, strict=True))
-            of = dict(zip((fits.HOLE, fits.PIN), halves, strict=True))
+            of = dict(zip(fits.patterns(study.mechanism), halves, strict=True))
             factors = tuple(of[t.pattern] for t in tolerances)
             reached = all(c.reach[0] <= f <= c.reach[1] for c, f in zip(costs, factors, strict=True))
             if zones.least < 0.0 or not reached:

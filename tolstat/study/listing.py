@@ -20,7 +20,7 @@ from tolstat.joint.model import TOLD, laid_over, leaves, nested
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube
 from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
-from tolstat.study.selection import UNITS, Assignments, Entry, Reading
+from tolstat.study.selection import Assignments, Entry, Reading, error_units
 from tolstat.study.tolerances.entry import Site
 
 Section = tuple[int | str, ...]
@@ -148,7 +148,9 @@ def axes_of_sweep(file: Reading) -> tuple[SweepAxis, ...]:
     axes = []
     for entry in file.entries("sweep"):
         with gather(file.faults):
-            units_of = UNITS if selection.select(entry.pattern, UNITS) else UNITS | KEYS
+            units_of = error_units(file.mechanism)
+            if not selection.select(entry.pattern, units_of):
+                units_of = units_of | KEYS
             names = selection.resolve(entry, units_of, file.place)
             with gather(file.faults):
                 file.claims.claim(entry, names)
@@ -194,10 +196,10 @@ def _grid(file: Reading) -> Iterator[Axis]:
     section = file.data.get("grid", {})
     if not isinstance(section, Mapping):
         return file.fault("grid", "is not a table", "write [grid]")
-    claims = Assignments(file.place)
-    for entry in selection.entries(section, "grid"):
+    claims, units_of = Assignments(file.place, file.mechanism), error_units(file.mechanism)
+    for entry in selection.entries(section, file.mechanism, "grid"):
         with gather(file.faults):
-            names = selection.resolve(entry, UNITS, file.place)
+            names = selection.resolve(entry, units_of, file.place)
             claims.claim(entry, names)
             if not isinstance(entry.value, list) or not entry.value:
                 file.fault(entry.path, f"{entry.value!r} is not a list of values", 'write ["0 deg", "15 deg"]')
@@ -206,7 +208,7 @@ def _grid(file: Reading) -> Iterator[Axis]:
             for number, value in enumerate(entry.value):
                 with gather(file.faults):
                     item = Entry(entry.pattern, (*entry.path, number), value)
-                    values.append(selection.quantity(item, UNITS[names[0]], file.place))
+                    values.append(selection.quantity(item, units_of[names[0]], file.place))
             yield Axis(entry, names, values)
 
 
@@ -222,7 +224,7 @@ def _cases(file: Reading, axes: list[Axis]) -> dict[str, dict[str, float]]:
             cases[name] = {}
         with gather(file.faults):
             entry = file.model(CaseEntry, item, "case", number)
-            claims = Assignments(file.place)
+            claims = Assignments(file.place, file.mechanism)
             for axis in axes:
                 claims.claim(axis.entry, axis.names)
             cases[entry.name] = selection.fixed_errors(file, entry.errors, ("case", number, "errors"), claims)
@@ -277,7 +279,7 @@ def _settings(file: Reading, entry: VariantEntry, nominal: Nominal, at: Section)
     with collected() as faults:
         with gather(faults):
             keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
-            operation = file.model(Operation, keys, *at, "operation")
+            operation = file.model(type(operation), keys, *at, "operation")
         if entry.solver.get("fidelity") == "auto":
             where = f"{file.place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
             faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tolstat.analysis.clustered import LEAST
-from tolstat.common.columns import KEPT, RESULT_NAMES, Column, kept_columns, kept_names
+from tolstat.common.columns import KEPT, Column, kept_columns, kept_names, result_columns
 from tolstat.common.loads import Limit
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Options, from_names
 from tolstat.common.units import Number
@@ -175,10 +176,9 @@ class Subset(Sampling):
     levels: Annotated[dict[str, Number], Field(min_length=1)]
     unresolved: Literal["above", "below"] = "below"
 
-    @property
-    def limit(self) -> Limit:
-        """The limit whose exceedance is estimated."""
-        return Limit(self.load, tuple(self.levels), tuple(self.levels.values()))
+    def limit(self, mechanism: Mechanism) -> Limit:
+        """The limit whose exceedance is estimated, of the study's mechanism."""
+        return Limit(self.load, tuple(self.levels), tuple(self.levels.values()), mechanism)
 
     @model_validator(mode="after")
     def _whole_seeds(self) -> Self:
@@ -189,21 +189,10 @@ class Subset(Sampling):
         return self
 
 
-def _check_pattern(pattern: str) -> str:
-    if selection.select(pattern, RESULT_NAMES):
-        return pattern
-    anywhere = f"*.{pattern}"
-    halves = selection.select(anywhere, RESULT_NAMES)
-    remedy = f"did you mean {anywhere!r}?" if halves else selection.suggestion(pattern, RESULT_NAMES)
-    raise refuse(f"{pattern!r} selects nothing", remedy)
-
-
 class Output(Strict):
     """What is stored of each joint."""
 
-    results: list[Annotated[str, AfterValidator(_check_pattern)]] | None = Field(
-        default=None, min_length=1, examples=[["cross*.[FT]_max"]]
-    )
+    results: list[str] | None = Field(default=None, min_length=1, examples=[["cross*.[FT]_max"]])
     """names or patterns of result columns to store beside status and course; all by default"""
     histories: Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"] = Field(
         default="none", examples=["harmonics+cycles"]
@@ -212,17 +201,28 @@ class Output(Strict):
     harmonics: int = Field(default=16, strict=True, ge=0, le=10_000, examples=[32])
     """highest order of the Fourier coefficients, where `histories` has them"""
 
-    def identity(self) -> dict[str, Any]:
+    def unknown(self, mechanism: Mechanism) -> Iterator[tuple[int, str, str]]:
+        """Number of each pattern of `results` that selects nothing, what is wrong with it, and the remedy."""
+        names = [column.name for column in result_columns(mechanism)]
+        for number, pattern in enumerate(self.results or ()):
+            if not selection.select(pattern, names):
+                anywhere = f"*.{pattern}"
+                remedy = selection.suggestion(pattern, names)
+                if selection.select(anywhere, names):
+                    remedy = f"did you mean {anywhere!r}?"
+                yield number, f"{pattern!r} selects nothing", remedy
+
+    def identity(self, mechanism: Mechanism) -> dict[str, Any]:
         """Settings that determine what is stored: names instead of patterns, no names if all results are kept."""
-        selected = [name for pattern in self.results or () for name in selection.select(pattern, RESULT_NAMES)]
-        names = kept_names(selected) if self.results else None
+        every = [column.name for column in result_columns(mechanism)]
+        selected = [name for pattern in self.results or () for name in selection.select(pattern, every)]
+        names = kept_names(selected, mechanism) if self.results else None
         rest = self.model_dump(exclude={"results"})
         return rest if names is None else rest | {"results": names}
 
-    @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self, mechanism: Mechanism) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return kept_columns({KEPT: self.identity().get("results")})
+        return kept_columns({KEPT: self.identity(mechanism).get("results")}, mechanism)
 
 
 class SweepEntry(Strict):

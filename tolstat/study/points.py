@@ -18,7 +18,7 @@ from tolstat.common import loads, units
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import Joint, Operation, orders
+from tolstat.joint import Joint, Operation, OperationInSeries, Series, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
 from tolstat.joint.sections import RIGID
@@ -56,6 +56,7 @@ class Point(NamedTuple):
         for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
             words += f", {orders.in_words(given)} of {name}" if given else ""
         words += f", {at.partner.in_words}" if at.partner else ""
+        words += f", {at.series.in_words}" if isinstance(at, OperationInSeries) else ""
         return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
     @classmethod
@@ -66,14 +67,17 @@ class Point(NamedTuple):
         for key, order in ORDERS.items():
             keys[key] = tuple(order.model_construct(**wave) for wave in keys.get(key, ()))
         keys["partner"] = Partner.model_construct(**keys["partner"]) if "partner" in keys else None
-        return cls(name, Operation.model_construct(None, **keys), math.nan if share is None else share)
+        kind: type[Operation] = OperationInSeries if "series" in keys else Operation
+        if "series" in keys:
+            keys["series"] = Series.model_construct(**keys["series"])
+        return cls(name, kind.model_construct(None, **keys), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
         """JSON values of the point.
 
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
         ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
-        ``partner`` with its keys in SI units.
+        ``partner`` and ``series`` with their keys in SI units.
         """
         values = self.operation.model_dump()
         values = {key: value for key, value in values.items() if key not in (*ORDERS, "partner") or value}
@@ -110,7 +114,7 @@ def read(file: Reading) -> tuple[Point, ...]:
             if entry.name in [point.name for point in points]:
                 found = f"a point {entry.name!r} exists already"
                 file.fault(f"operation[{number}].name", found, "give each point its own name")
-            of_point = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
+            of_point = _of_mechanism(file, entry)
             points.append(Point(entry.name, of_point, math.nan if entry.share is None else entry.share))
     if not section:
         file.fault("operation", "has no operating point", "add one: [operation]")
@@ -129,7 +133,15 @@ def operation(file: Reading) -> Operation:
     """
     if "operation" not in file.data:
         raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
-    return file.model(Operation, file.data["operation"], "operation")
+    return _of_mechanism(file, file.model(Operation, file.data["operation"], "operation"))
+
+
+def _of_mechanism(file: Reading, read: Operation) -> Operation:
+    """Operating point with joint 2 of ``[series]``, if the file has one."""
+    values = {key: getattr(read, key) for key in Operation.model_fields}
+    if file.series is None:
+        return Operation.model_construct(**values)
+    return OperationInSeries.model_construct(**values, series=file.series)
 
 
 def _note_shares(file: Reading, points: Sequence[Point]) -> None:
@@ -250,6 +262,8 @@ class Setting(NamedTuple):
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse axial forces and swings without effect, and closed forms where an axial force moves the output shaft.
 
+    In series, refuse what only one joint can have.
+
     Parameters
     ----------
     settings : sequence of Setting
@@ -274,6 +288,16 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
+    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
+    for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
+        found = "stands beside [series]: both joints are simulated, none stands for the other"
+        yield path, found, "remove it, or [series]"
+    if any(setting.joint.shaft.slides for setting in in_series):
+        found = "is not rigid: in series, tube and shafts are held on their axes, along and across"
+        yield ("joint", "shaft", "axial"), found, 'write "rigid", or remove [series]'
+    if any(setting.fidelity == "ideal" for setting in in_series):
+        found = "'ideal' does not hold in series: its closed forms are those of one joint"
+        yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint) -> str:

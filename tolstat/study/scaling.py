@@ -161,7 +161,7 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int,
     """
     text = study.text if text is None else text
     data = tomllib.loads(text)
-    every = list(fits.entries(data["tolerances"], study.fit))
+    every = list(fits.entries(data["tolerances"], study.fit, study.mechanism))
     changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
     for entry in every:
         if entry.pattern in entries and entry.path != fits.PATH:

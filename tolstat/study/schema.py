@@ -15,12 +15,14 @@ from typing import Any
 from pydantic import BaseModel
 
 from tolstat.common import loads, strict
-from tolstat.common.channels import COMPONENTS, PLANES
+from tolstat.common.cardan import MECHANISMS
+from tolstat.common.channels import components, planes
 from tolstat.common.files import data_dir
-from tolstat.common.loads import UNIT_OF_LIMIT
+from tolstat.common.loads import units_of_limits
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
-from tolstat.joint import Joint, Operation
+from tolstat.joint import Joint, Operation, Series
 from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone
@@ -30,7 +32,7 @@ from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
-from tolstat.study.selection import GIVEN, TOLERANCED, UNITS
+from tolstat.study.selection import error_units, given_units, halves, toleranced_units
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES
@@ -41,6 +43,8 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 """The newest draft that all editors read."""
 WILD = r"[^.]*[*?\[][^.]*"
 """Half of a name with a wildcard."""
+FEATURE = rf"(?:[^.]*\.)?{WILD}|{WILD}\.[^.]*"
+"""What stands before the last dot of a name, with a wildcard; a joint may stand before it."""
 REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
 
@@ -107,16 +111,17 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
     features: dict[str, dict[str, Schema]] = {}
     names_of: dict[str, list[str]] = {}
     for name, schema in entries.items():
-        feature, _, half = name.partition(".")
+        feature, half = halves(name)
         features.setdefault(feature, {})[half] = schema
         names_of.setdefault(json.dumps(schema), []).append(name)
     wild = {"anyOf": _different(schema for name, schema in entries.items() if not is_zone(name))}
-    nested = {
-        feature: halves.get("") or _closed(halves, {f"^{WILD}$": wild} if wild["anyOf"] else None)
-        for feature, halves in features.items()
-    }
+    nested: dict[str, Schema] = {}
+    for feature, keys in features.items():
+        joint, _, own = feature.rpartition(".")
+        around = nested.setdefault(joint, _closed({}, {r"[.*?\[]": wild}))["properties"] if joint else nested
+        around[own] = keys.get("") or _closed(keys, {f"^{WILD}$": wild} if wild["anyOf"] else None)
     patterns = {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
-    patterns |= {rf"^(?:{'|'.join(features)}|{WILD})\.{WILD}{end}$": wild}
+    patterns |= {rf"^(?:{'|'.join(map(re.escape, features))}|{FEATURE})\.{WILD}{end}$": wild}
     return _closed(nested, patterns) | {"description": description}
 
 
@@ -134,12 +139,17 @@ def _keys(names: Iterable[str]) -> str:
     """Regular expression of names, and of patterns with a wildcard before the dot alone."""
     halves_of: dict[str, list[str]] = {}
     for name in names:
-        feature, dot, half = name.partition(".")
-        halves_of.setdefault(feature, []).append(re.escape(dot + half))
+        feature, _ = halves(name)
+        halves_of.setdefault(feature, []).append(re.escape(name[len(feature) :]))
     features_of: dict[str, list[str]] = {}
-    for feature, halves in halves_of.items():
-        features_of.setdefault("|".join(halves), []).append(feature)
-    return "|".join(f"(?:{'|'.join(features)}|{WILD})(?:{ends})" for ends, features in features_of.items())
+    for feature, keys in halves_of.items():
+        features_of.setdefault("|".join(keys), []).append(re.escape(feature))
+    return "|".join(f"(?:{'|'.join(features)}|{FEATURE})(?:{ends})" for ends, features in features_of.items())
+
+
+def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:
+    """Names in all mechanisms, with their units."""
+    return {name: unit for mechanism in MECHANISMS.values() for name, unit in units_of(mechanism).items()}
 
 
 def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:
@@ -158,30 +168,33 @@ def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     swept = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
+    errors, drawn = _every(error_units), _every(toleranced_units)
     grid = {
-        name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", UNITS).items()
+        name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", errors).items()
     }
     limited = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
-    toleranced = _entries("tolerance", TOLERANCED)
-    toleranced |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
+    toleranced = _entries("tolerance", drawn)
+    toleranced |= {name: {"x-table": key} for name in drawn if (key := halves(name)[1]) in ZONE_KINDS}
     scatter = _table("How errors scatter, by name or pattern.", toleranced)
     points = [of_model(Operation), _listed(PointEntry) | {"minItems": 1}]
     return {
         "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
         "operation": {"anyOf": points, "description": points[0]["description"]},
+        "series": of_model(Series),
         "solver": of_model(Solver),
         "errors": _table(
-            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", GIVEN)
+            "Errors that every joint has, by name or pattern: deviations from nominal.",
+            _entries("quantity", _every(given_units)),
         ),
         "tolerances": scatter | {"properties": {fits.KEY: {"x-table": fits.KEY}} | scatter["properties"]},
         "correlation": _listed(Correlation),
         "sampling": of_model(Sampling),
-        "sweep": _table(swept, _entries("sweep", UNITS | KEYS)),
+        "sweep": _table(swept, _entries("sweep", errors | KEYS)),
         "grid": _table("Values at which all cases are run, by name or pattern; several entries make a grid.", grid),
         "case": _listed(CaseEntry),
         "variant": _listed(VariantEntry),
         "assumed": _listed(Assumed),
-        "limits": _table(limited, _entries("limit", UNIT_OF_LIMIT), end=f"(?:{loads.AT}[A-Za-z].*)?"),
+        "limits": _table(limited, _entries("limit", _every(units_of_limits)), end=f"(?:{loads.AT}[A-Za-z].*)?"),
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }
@@ -211,7 +224,7 @@ def _definitions() -> dict[str, Schema]:
         **entries,
         **{f"{name}_1": _changed(schema, _pure) for name, schema in entries.items()},
         **{key: {"anyOf": _different(map(of_model, kinds.values()))} for key, kinds in ZONE_KINDS.items()},
-        "errors": _table("", _entries("quantity", GIVEN)),
+        "errors": _table("", _entries("quantity", _every(given_units))),
         "keys": keys,
         "overrides": keys | {"properties": {"base": base} | keys["properties"]},
         "vary": _overriding(joint(), {"x-table": "range"}),
@@ -227,9 +240,9 @@ def _definitions() -> dict[str, Schema]:
 
 def _lines() -> Schema:
     """Schema of S–N lines by component, or by direction of a force or moment."""
-    components = _table("", _entries("line", dict.fromkeys(COMPONENTS, "N")))
-    directions = _table("", _entries("line", dict.fromkeys(PLANES, "N")), " at .+")
-    return components | {"patternProperties": components["patternProperties"] | directions["patternProperties"]}
+    signed = _table("", _entries("line", dict.fromkeys(_every(components), "N")))
+    directions = _table("", _entries("line", dict.fromkeys(_every(planes), "N")), " at .+")
+    return signed | {"patternProperties": signed["patternProperties"] | directions["patternProperties"]}
 
 
 def study() -> Schema:

@@ -8,34 +8,49 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
+from tolstat.common.cardan import CARDAN, SERIES
 from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.mechanism import Mechanism, features
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
-from tolstat.common.tables import ERROR_FIELDS
+from tolstat.common.tables import tables
 from tolstat.common.units import to_si
-from tolstat.joint import HOLE_OF_PIN
 from tolstat.joint.reading import is_joint
 from tolstat.study import signals
-from tolstat.study.axes import PAIRS, ZONE_UNITS, columns_of, compatible, is_zone, zone_of
+from tolstat.study.axes import alike, columns_of, compatible, is_pair, is_zone, own, zone_of, zone_units
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
-UNITS = {field.name: field.unit for field in ERROR_FIELDS}
-"""SI unit of every error, in the order of the table."""
 
-GIVEN = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
-"""SI unit of the errors that ``[errors]`` and a case can give."""
-TOLERANCED = UNITS | ZONE_UNITS
-"""SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
+@cache
+def error_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of every error, in the order of the table."""
+    return {field.name: field.unit for field in tables(mechanism).error_fields}
 
-_DIAMETERS = {f"{pin}.clearance": (f"{pin}.diameter", f"{hole}.diameter") for pin, hole in HOLE_OF_PIN.items()}
-EXCLUDES = _DIAMETERS | {of: (name,) for name, diameters in _DIAMETERS.items() for of in diameters}
-"""Errors that say in another way what an error says: the clearance of a pin, and the diameters of pin and hole."""
+
+@cache
+def given_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of the errors that ``[errors]`` and a case can give."""
+    return {name: unit for name, unit in error_units(mechanism).items() if not name.startswith("operation.")}
+
+
+@cache
+def toleranced_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
+    return error_units(mechanism) | zone_units(mechanism)
+
+
+@cache
+def excludes(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Errors that say in another way what an error says: the clearance of a pin, and the diameters of pin and hole."""
+    diameters = {f"{pair.pin}.clearance": (f"{pair.pin}.diameter", f"{pair.hole}.diameter") for pair in mechanism.pairs}
+    return diameters | {of: (name,) for name, both in diameters.items() for of in both}
 
 
 class Entry(NamedTuple):
@@ -56,10 +71,19 @@ class Entry(NamedTuple):
     value: Any
 
 
-def entries(table: Mapping[str, Any], *section: int | str) -> Iterator[Entry]:
+@cache
+def joints(mechanism: Mechanism) -> set[str]:
+    """Names of the joints that stand before those of features; empty where there is one joint."""
+    return {feature.rpartition(".")[0] for feature in features(mechanism)} - {""}
+
+
+def entries(table: Mapping[str, Any], mechanism: Mechanism, *section: int | str) -> Iterator[Entry]:
     """Entries of the table at the key path `section` whose keys are names, written quoted or dotted."""
     for key, value in table.items():
-        if key.isidentifier() and isinstance(value, Mapping):
+        if key in joints(mechanism) and isinstance(value, Mapping):
+            for entry in entries(value, mechanism, *section, key):
+                yield entry._replace(pattern=f"{key}.{entry.pattern}")
+        elif key.isidentifier() and isinstance(value, Mapping):
             for name, inner in value.items():
                 yield Entry(f"{key}.{name}", (*section, key, name), inner)
         else:
@@ -82,23 +106,31 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
 
 
 def select(pattern: str, names: Iterable[str]) -> list[str]:
-    """Return those of `names` that a pattern selects; ``*`` does not match across the dot.
+    """Return those of `names` that a pattern selects; ``*`` does not match across a dot.
 
     A zone, and each quantity that it draws, is selected by its full key only: ``"pin1.offset_*"`` means the offsets
     along e, t, z. A pair is selected by a pattern with an underscore before the dot, such as ``"*_holes.position"``.
     """
-    feature, _, key = pattern.partition(".")
-    return [name for name in names if _matches(feature, name.partition(".")[0]) and _is_key(key, name)]
+    feature, key = halves(pattern)
+    return [name for name in names if _matches(feature, halves(name)[0]) and _is_key(key, name)]
+
+
+def halves(name: str) -> tuple[str, str]:
+    """Feature and key of a name or pattern: of ``joint1.pin1.tilt_t`` ``joint1.pin1`` and ``tilt_t``."""
+    feature, dot, key = name.rpartition(".")
+    return (feature, key) if dot else (key, "")
 
 
 def _matches(pattern: str, feature: str) -> bool:
-    return fnmatchcase(feature, pattern) and (feature not in PAIRS or "_" in pattern)
+    parts = list(zip(feature.split("."), pattern.split("."), strict=False))
+    agree = feature.count(".") == pattern.count(".") and all(fnmatchcase(*part) for part in parts)
+    return agree and (not is_pair(feature) or "_" in own(pattern))
 
 
 def _is_key(pattern: str, name: str) -> bool:
     if not is_zone(name):
-        return fnmatchcase(name.partition(".")[2], pattern)
-    return pattern in (name.partition(".")[2], zone_of(name).partition(".")[2])
+        return fnmatchcase(halves(name)[1], pattern)
+    return pattern in (own(name), own(zone_of(name)))
 
 
 def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
@@ -136,19 +168,22 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
 
 def suggestion(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
-    feature, _, key = pattern.partition(".")
-    features = list(dict.fromkeys(name.partition(".")[0] for name in names))
-    known = [f for f in features if _matches(feature, f)]
+    feature, key = halves(pattern)
+    every = list(dict.fromkeys(halves(name)[0] for name in names))
+    known = [name for name in every if _matches(feature, name)]
     if not known:
-        return did_you_mean(feature, features)
-    return did_you_mean(key, [n.partition(".")[2] for n in names if n.partition(".")[0] == known[0]])
+        joint = next((name.rpartition(".")[0] for name in every if _matches(feature, own(name))), "")
+        if joint:
+            return f"write the joint before it: {joint}.{pattern}, or {alike(joint)}.{pattern} for all joints"
+        return did_you_mean(feature, every)
+    return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]])
 
 
 class Assignments:
     """Record of the entry that sets each error; a second entry for the same error is a fault that names both."""
 
-    def __init__(self, place: str) -> None:
-        self._place = place
+    def __init__(self, place: str, mechanism: Mechanism) -> None:
+        self._place, self._excludes = place, excludes(mechanism)
         self._owner: dict[str, list[tuple[Entry, str]]] = {}
 
     def claim(self, entry: Entry, names: Iterable[str]) -> None:
@@ -166,7 +201,7 @@ class Assignments:
                 owners = self._owner.setdefault(column, [])
                 clashes |= {setter.path: column for setter, other in owners if not compatible(name, other)}
                 owners.append((entry, name))
-                for other in EXCLUDES.get(column, ()):
+                for other in self._excludes.get(column, ()):
                     for setter, _ in self._owner.get(other, ())[:1]:
                         both.setdefault(setter.path, (column, other))
         if clashes or both:
@@ -180,7 +215,7 @@ class Assignments:
     def _columns(entry: Entry, name: str) -> tuple[str, ...]:
         """Columns that an entry sets: a zone between two planes bounds one tilt of a feature."""
         about = entry.value.get("about") if isinstance(entry.value, Mapping) and is_zone(name) else None
-        if about not in ("t", "z") or name.partition(".")[0] in PAIRS:
+        if about not in ("t", "z") or is_pair(halves(name)[0]):
             return columns_of(name)
         return tuple(column for column in columns_of(name) if column.endswith(f"tilt_{about}"))
 
@@ -209,6 +244,8 @@ class Reading:
         What stands before the key path in the place of a fault.
     faults : list of Fault
         Those found so far.
+    mechanism : Mechanism
+        What it is about.
     claims : Assignments
         Entries that set errors.
     parts : dict
@@ -225,7 +262,8 @@ class Reading:
         self._source, self._has_lines = read_text(path) if text is None else text, text is None
         self.text, self.data = self._source, read_toml(path, self._source)
         self.faults: list[Fault] = []
-        self.claims = Assignments(self.place)
+        self.mechanism = SERIES if "series" in self.data else CARDAN
+        self.claims = Assignments(self.place, self.mechanism)
         self.parts: dict[str, Any] = {"signals": ()}
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
@@ -284,7 +322,7 @@ class Reading:
 
     def entries(self, section: str) -> Iterator[Entry]:
         """Entries of a section whose keys are names."""
-        return entries(self.table(section), section)
+        return entries(self.table(section), self.mechanism, section)
 
     def model(self, model: type[ModelT], data: object, *path: int | str, **context: Any) -> ModelT:
         """Read the table at a key path.
@@ -327,13 +365,14 @@ def fixed_errors(
         Error name to deviation (SI).
     """
     fixed: dict[str, float] = {}
-    for entry in entries(table, *section):
+    units = given_units(file.mechanism)
+    for entry in entries(table, file.mechanism, *section):
         if entry.pattern.startswith("operation."):
             file.fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
             continue
         with gather(file.faults):
-            selected = resolve(entry, GIVEN, file.place)
-            value = quantity(entry, GIVEN[selected[0]], file.place)
+            selected = resolve(entry, units, file.place)
+            value = quantity(entry, units[selected[0]], file.place)
             claims.claim(entry, selected)
             fixed |= dict.fromkeys(selected, value)
     return fixed

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.columns import holds
+from tolstat.common.columns import Column, holds
 from tolstat.common.errors import Fault, raise_all
-from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
+from tolstat.common.loads import limits_in_words, loads_of, split
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
@@ -109,6 +110,16 @@ class Study:
     fit: Fit | None = None
     assumed: tuple[Assumed, ...] = ()
     signals: tuple[str, ...] = ()
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What is simulated: a Cardan joint, or joints in series."""
+        return self.operation.mechanism
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the results that are kept."""
+        return self.output.columns(self.mechanism)
 
     @property
     def name(self) -> str:
@@ -219,7 +230,7 @@ class Study:
 
     def has_bonus(self, name: str) -> bool:
         """Whether `name` is a position with a bonus, or the diameter of such a feature."""
-        feature, _, key = name.partition(".")
+        feature, _, key = name.rpartition(".")
         axis = self.axes.get(feature)
         return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
 
@@ -245,7 +256,7 @@ class Study:
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(dict.fromkeys(split(name)[0] for name in self.limits))
-        return [load for load in UNIT_OF_LOAD if holds(self.output.columns, load)]
+        return [name for name, load in loads_of(self.mechanism).items() if holds(self.columns, load)]
 
     def __repr__(self) -> str:
         parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
@@ -263,7 +274,7 @@ class Study:
             "fixed errors, SI": ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none",
             "sampling": f"{sampling.method}, {self.samples} joints, seed {sampling.seed}",
             "toleranced": ", ".join(self.tolerances) or "none",
-            "limits": limits_in_words(self.limits),
+            "limits": limits_in_words(self.limits, self.mechanism),
         }
         rows = (f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in entries.items())
         return f"<table><caption>{escape(repr(self)[1:-1])}</caption>{''.join(rows)}</table>"
@@ -284,7 +295,7 @@ class Study:
             "correlation": {"names": list(self.copula.names), "matrix": self.copula.matrix.tolist()},
             "sampling": self.sampling.model_dump(),
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
-            "output": self.output.identity(),
+            "output": self.output.identity(self.mechanism),
         }
         optional = {
             "axes": {name: axis.describe() for name, axis in self.axes.items()},

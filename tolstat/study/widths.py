@@ -18,9 +18,9 @@ import numpy as np
 from tolstat.common import units
 from tolstat.common.errors import collected, gather, input_error
 from tolstat.common.strict import did_you_mean
-from tolstat.joint import HOLE_OF_PIN, varied
+from tolstat.joint import varied
 from tolstat.study import rewriting, scaling, selection
-from tolstat.study.axes import is_zone
+from tolstat.study.axes import is_pin, is_zone
 from tolstat.study.file import load
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, iso
@@ -89,8 +89,8 @@ def label(study: Study, entry: Toleranced) -> str:
 def features(study: Study) -> list[Group]:
     """Each pin with its hole: all that is drawn of the two."""
     groups = [
-        Group(f"{pin} and {hole}", tuple(name for name in _drawn(study) if name.partition(".")[0] in (pin, hole)))
-        for pin, hole in HOLE_OF_PIN.items()
+        Group(f"{pin} and {hole}", tuple(name for name in _drawn(study) if name.rpartition(".")[0] in (pin, hole)))
+        for pin, hole, _ in study.mechanism.pairs
     ]
     return [group for group in groups if group.names]
 
@@ -209,7 +209,7 @@ def factors(study: Study, line: Group, step: str) -> dict[str, float]:
     assert study.fit is not None
     pairs = zip(other_fits(study.fit)[step], study.fit.entry.zones, strict=True)
     hole, pin = (new.half / old.half for new, old in pairs)
-    return {name: hole if name.startswith("hole") else pin for name in line.names}
+    return {name: pin if is_pin(name) else hole for name in line.names}
 
 
 def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
@@ -266,7 +266,7 @@ def _fit_label(study: Study) -> str:
 
 
 def _is_of_fit(study: Study, entry: Toleranced) -> bool:
-    return study.fit is not None and entry.pattern in (fits.HOLE, fits.PIN)
+    return study.fit is not None and entry.pattern in fits.patterns(study.mechanism)
 
 
 def _free(study: Study, entry: Toleranced) -> bool:

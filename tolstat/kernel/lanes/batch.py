@@ -7,6 +7,7 @@ import numpy as np
 from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import sizes
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.parameters import numbers
 from tolstat.common.tables import Options, tables
 from tolstat.kernel.codes import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
@@ -99,6 +100,8 @@ def make_batch(options: Options, width: int = WIDTH, mechanism: Mechanism = CARD
     dtypes = work_dtype(mechanism), factors_dtype(mechanism), motion, control, peaks_dtype(mechanism)
     pars = aligned_zeros(1, lane_dtype(tables(mechanism).PARAM, width)).view(np.recarray)
     records = (aligned_zeros(1, lane_dtype(dtype, width)).view(np.recarray)[0] for dtype in dtypes)
+    for name, values in numbers(mechanism).items():
+        pars[0][name] = values
     words = pars.view(np.float64).view(np.ndarray)
     return Batch(
         pars[0],

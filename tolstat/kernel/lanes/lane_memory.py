@@ -6,8 +6,10 @@ A record of one joint, of width 1, is read as plain numbers.
 import numpy as np
 from numba.core import types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import intrinsic, overload, overload_attribute, register_model
 
+from tolstat.common.cardan import CARDAN
+from tolstat.common.parameters import NUMBERS, numbers
 from tolstat.kernel.simd.lane import LANE, SINGLE, WIDTH
 
 ALIGNMENT = 8 * WIDTH
@@ -15,7 +17,12 @@ ALIGNMENT = 8 * WIDTH
 
 
 class LaneRecord(types.Record):
-    """A record of lanes: a NumPy record whose float fields have a last axis of joints."""
+    """A record of lanes: a NumPy record whose float fields have a last axis of joints.
+
+    The numbers of the mechanism are `constants` of the code, which loops over its parts are unrolled with.
+    """
+
+    constants = None
 
     @property
     def dtype(self):
@@ -31,13 +38,35 @@ class LaneRecordModel(models.RecordModel):
 def record_of_lanes(record):
     """Numba type of a record whose float fields are lanes; `record` is the type of the NumPy record."""
     fields, lanes_of = [], {types.float64: LANE, types.float32: SINGLE}
+    constants = next((NUMBERS[name] for name in record.fields if name in NUMBERS), {})
     for name, field in record.fields.items():
+        if name in constants:
+            continue
         ty = field.type
         if isinstance(ty, types.NestedArray) and ty.dtype in lanes_of:
             shape, value = ty.shape[:-1], lanes_of[ty.dtype] if ty.shape[-1] == WIDTH else ty.dtype
             ty = types.NestedArray(value, shape) if shape else value
         fields.append((name, {"type": ty, "offset": field.offset}))
-    return LaneRecord(fields, record.size, record.aligned)
+    of_lanes = LaneRecord(fields, record.size, record.aligned)
+    of_lanes.constants = constants
+    return of_lanes
+
+
+def _constant(name):
+    """Implementation of an attribute of `LaneRecord`: one of its constants."""
+
+    def get(record):
+        if not record.constants or name not in record.constants:
+            return None
+        value = record.constants[name]
+        value = value if value.ndim > 0 else int(value)
+        return lambda record: value
+
+    return get
+
+
+for _name in numbers(CARDAN):
+    overload_attribute(LaneRecord, _name)(_constant(_name))
 
 
 def as_lanes(memory):

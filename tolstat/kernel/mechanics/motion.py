@@ -1,7 +1,7 @@
 """Ideal motion of the members (docs/model.md, "Frames"); the unknowns are deviations from it."""
 
 from tolstat.common.mechanism import DRIVEN, HELD, X, Y
-from tolstat.kernel.mechanics.cardan.motion import write_joints
+from tolstat.kernel.mechanics.cardan import write_joints
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
 from tolstat.kernel.simd.jit import njit
 

@@ -6,6 +6,7 @@ motion of pins and hub together changes no cross bushing load. Neglected terms, 
 beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
 """
 
+from tolstat.common.mechanism import ALONG_Z
 from tolstat.kernel.mechanics.bushing import is_lump, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.motion import to_pin
@@ -43,12 +44,16 @@ def clear(par, work):
 @njit
 def spread(matrices, i, body, k, par):
     """Columns of R diag(k) R^T, R being matrix `i` of `matrices`; `k`: along the triad of `body`."""
-    x, y = (k[1], k[0]) if par.quarters[body] % 2 == 1 else (k[0], k[1])
+    x, y, z = k
+    if par.quarters[body] == ALONG_Z:
+        x, y, z = k[1], k[2], k[0]
+    elif par.quarters[body] % 2 == 1:
+        x, y = k[1], k[0]
     columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
     return (
-        _spread_column(columns, (x * columns[0][0], y * columns[1][0], k[2] * columns[2][0])),
-        _spread_column(columns, (x * columns[0][1], y * columns[1][1], k[2] * columns[2][1])),
-        _spread_column(columns, (x * columns[0][2], y * columns[1][2], k[2] * columns[2][2])),
+        _spread_column(columns, (x * columns[0][0], y * columns[1][0], z * columns[2][0])),
+        _spread_column(columns, (x * columns[0][1], y * columns[1][1], z * columns[2][1])),
+        _spread_column(columns, (x * columns[0][2], y * columns[1][2], z * columns[2][2])),
     )
 
 
@@ -178,7 +183,7 @@ def connect_shaft(unknown, arm, f, torque, edge):
 
 @njit
 def _directions(pin, j, par, work):
-    """Write d(displacements of a station along n and m) / d(pin, hole) to ``work.vectors``."""
+    """Write d(displacements of station `j` along n and m) / d(pin, hole) to ``work.vectors``."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])

@@ -1,5 +1,6 @@
-"""Components along the lumps' triads (e, t, z): frame axes after quarter turns about z, so nothing is multiplied."""
+"""Components along the lumps' triads (e, t, z): frame axes after quarter turns, so nothing is multiplied."""
 
+from tolstat.common.mechanism import ALONG_Z
 from tolstat.kernel.simd.jit import njit
 
 
@@ -7,6 +8,8 @@ from tolstat.kernel.simd.jit import njit
 def to_triad(body, a, par):
     """Components along e, t and z of a vector in axes of the body's frame."""
     quarters = par.quarters[body]
+    if quarters == ALONG_Z:
+        return (a[2], a[0], a[1])
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = y, -x
@@ -19,6 +22,8 @@ def to_triad(body, a, par):
 def from_triad(body, a, par):
     """Components in axes of the body's frame of a vector given along e, t and z."""
     quarters = par.quarters[body]
+    if quarters == ALONG_Z:
+        return (a[1], a[2], a[0])
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = -y, x

@@ -4,7 +4,7 @@ import math
 
 from tolstat.common.load_kinds import CONTACTS, RESULTANT
 from tolstat.common.tables import LIFE_EXPONENT
-from tolstat.kernel.mechanics.cardan.motion import PINS_OF_JOINT, travel
+from tolstat.kernel.mechanics.cardan import PINS_OF_JOINT, travel
 from tolstat.kernel.mechanics.loads import CONTACT_FORCES
 from tolstat.kernel.mechanics.motion import drive_and_load
 from tolstat.kernel.simd.jit import njit

@@ -2,8 +2,8 @@
 
 import math
 
+from tolstat.kernel.cardan.ideal_loads import ideal_loads
 from tolstat.kernel.codes import NOT_FINITE, OK, OUTSIDE_MODEL
-from tolstat.kernel.mechanics.cardan.ideal_loads import ideal_loads
 from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.revolution.outcome import clear_results, clear_samples, finish, inside_model, is_finite
 from tolstat.kernel.revolution.settle import record, summarise

@@ -27,7 +27,7 @@ def plus(total, value, c, s):
 
 @njit
 def of_order(i, par, samples, out):
-    """Write all amplitudes of order ``ORDERS[i]`` to a row of KERNEL_RESULT."""
+    """Write all amplitudes of order number `i` of `ORDERS` to a row of KERNEL_RESULT."""
     n, number = samples.size, len(ORDERS)
     turn_c, turn_s = math.cos(2 * math.pi * ORDERS[i] / n), -math.sin(2 * math.pi * ORDERS[i] / n)
     none = (0.0, 0.0)

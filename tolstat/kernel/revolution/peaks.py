@@ -34,7 +34,7 @@ NEAR = 0.9
 
 @njit
 def follow_value(i, load, par, peaks):
-    """Include the value of load `i` and, where it is interpolated, its peak at the step before, if there is one."""
+    """Include the value `load` of load `i` in `peaks`; if it is interpolated, also its peak at the step before."""
     last, before, top = peaks.last[i], peaks.before[i], peaks.top[i]
     if par.interpolated[i] == 1:
         at_peak = (last >= before) & (last >= load) & (last > NEAR * top)
@@ -79,7 +79,7 @@ def largest_at_an_end(lane, par, peaks):
 
 @njit
 def write_peaks(lane, par, peaks, out):
-    """Write largest and smallest loads of a lane to `out`, a row of KERNEL_RESULT."""
+    """Write largest and smallest loads in `peaks` of a lane to `out`, a row of KERNEL_RESULT."""
     for i in range(peaks.top.shape[0]):
         top = pick(peaks.top[i], lane)
         out.largest[i] = math.sqrt(top) if par.modulus[i] == 1 else top

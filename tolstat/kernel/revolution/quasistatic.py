@@ -11,7 +11,7 @@ where pseudo-transient continuation leads from there.
 import math
 
 from tolstat.kernel.codes import AHEAD
-from tolstat.kernel.mechanics.cardan.motion import ideal_ratio
+from tolstat.kernel.mechanics.cardan import ideal_ratio
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
 from tolstat.kernel.mechanics.motion import drive_and_load
 from tolstat.kernel.simd.jit import njit

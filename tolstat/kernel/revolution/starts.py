@@ -3,8 +3,8 @@
 The lock-step does not compute it, so that it has no equations of motion for plain numbers to compile.
 """
 
+from tolstat.kernel.cardan.guess import rigid_guess
 from tolstat.kernel.codes import DYNAMIC, RAMP
-from tolstat.kernel.mechanics.cardan.guess import rigid_guess
 from tolstat.kernel.mechanics.dynamics import acceleration
 from tolstat.kernel.revolution.outcome import inside_model
 from tolstat.kernel.revolution.quasistatic import angle_time

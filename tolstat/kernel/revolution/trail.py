@@ -44,7 +44,7 @@ class Trail(NamedTuple):
 def make_trails(
     joints: int, steps_per_rev: int, capacity: int, mechanism: Mechanism = CARDAN
 ) -> tuple[np.ndarray, np.recarray, np.recarray]:
-    """Allocate the arrays of several trails, for `capacity` revolutions."""
+    """Allocate the arrays of the trails of several `joints`, for `capacity` revolutions of `steps_per_rev`."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
     loads = np.full((joints, capacity, angles, sizes(mechanism).deciding), np.nan)
     return loads, np.zeros((joints, capacity), tables(mechanism).KERNEL_RESULT).view(np.recarray), make_notes(joints)

@@ -22,7 +22,6 @@ from tolstat.questions.bearing_life import lives as rating
 from tolstat.store.view import View
 
 FEW = "needs more joints"
-PLACE_NAMES = {rating.JOINT: "all four", rating.ANY: "at least one"}
 UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
 UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
@@ -45,42 +44,37 @@ def _undecided(row: Row) -> bool:
     return bool(row["n_failed"] + row["n_unsettled"] == row["n"] or shares.unresolved_matter(row))
 
 
-BEARING = Column("bearing", lambda row: PLACE_NAMES.get(row["place"], str(row["place"])))
 LIVES = (
-    BEARING,
     Column("nominal", lambda row: _hours(row[rating.SHARES[-1]]["nominal"]), rank=2),
     *of_shares(rating.SHARES, "reach", lambda row: _hours(row["estimate"]), rank=1),
     Column(f"95 % interval of {100.0 * rating.SHARES[-1]:g} %", lambda row: _span(row[rating.SHARES[-1]])),
 )
-"""Columns of the table ``lives``, arranged by place."""
+"""Columns of the table ``lives`` after the bearing, arranged by place."""
 LOADS = (
-    BEARING,
     Column("nominal", lambda row: text.value(row[rating.SHARES[-1]]["nominal_load"], "N")),
     *of_shares(rating.SHARES, "up to", lambda row: text.value(row["load"], "N")),
 )
-"""Columns of the table ``loads``, arranged by place."""
+"""Columns of the table ``loads`` after the bearing, arranged by place."""
 BELOW = (
-    BEARING,
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: "-" if _undecided(row) else text.percent(row["estimate"])),
     Column("95 % interval", shares.shares("lower", "upper"), shown=has("lower")),
     Column("total interval", shares.shares("total_lower", "total_upper"), shown=has("total_lower")),
     Column("without a life above, below", shares.shares("bound_lower", "bound_upper"), shown=has_unresolved, rank=1),
 )
-"""Columns of the table ``below_required``."""
+"""Columns of the table ``below_required`` after the bearing."""
 CONTACTS = (
-    BEARING,
     Column("at one end", shares.share("one_end")),
     Column("at opposite ends", shares.share("opposite_ends")),
     Column("along its length", shares.share("along")),
 )
-"""Columns of the table ``contacts``."""
+"""Columns of the table ``contacts`` after the bearing."""
 
 
 def bearing_life(view: View) -> Answer:
     """Compute the life of the pins' bearings.
 
-    Gives the life that 50, 90 and 99 % of the joints reach, for each bearing and for all four together, the share of
+    Gives the life that 50, 90 and 99 % of the joints reach, for each bearing and for all of them together, the share of
     the joints that do not reach the required life, each with its 95 % interval, the dynamic equivalent loads, and how
     the bearings are loaded.
 
@@ -110,6 +104,8 @@ def bearing_life(view: View) -> Answer:
         See `lives.lives_of`.
     """
     lives = rating.lives_of(view)
+    names = {rating.JOINT: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
+    bearing = Column("bearing", lambda row: names.get(row["place"], str(row["place"])))
     reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
@@ -119,15 +115,16 @@ def bearing_life(view: View) -> Answer:
         parts.append(Panels([Panel("lives", "Life of the joints", words, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
-        parts.append(Table("lives", title, LIVES, reached, UNITS, by_share(reached, "place")))
+        parts.append(Table("lives", title, (bearing, *LIVES), reached, UNITS, by_share(reached, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
-        parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
+        parts += [Table("below_required", title, (bearing, *BELOW), below, {"required": "h"})] if below else []
     loads, units = rating.load_rows(lives), {"nominal_load": "N", "load": "N"}
     title = "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
-    parts.append(Table("loads", title, LOADS, loads, units, by_share(loads, "place")))
+    parts.append(Table("loads", title, (bearing, *LOADS), loads, units, by_share(loads, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
-        parts.append(Table("contacts", title, CONTACTS, contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
+        units = dict.fromkeys(list(contacts[0])[1:], "1")
+        parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
     facts: dict[str, Any] = {name: getattr(lives.bearing, name) for name in ("symbol", "critical_amplitude")}
     facts |= {name: getattr(lives, name) for name in ("unrated", "short", "fretting", "load_error")}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
@@ -153,7 +150,7 @@ def _verdict(lives: rating.Lives, below: Rows, reached: Rows) -> list[str]:
     total = "" if interval == "-" else f" (total interval {interval})"
     sentences = [f"{text.percent(row['estimate'])} of the joints{total} do not reach {required}"]
     sentences += [f"{_without(row)}: {_bounds(row)}"] if has_unresolved([row]) else []
-    best = reached[-1]  # all four bearings, the largest share
+    best = reached[-1]  # all bearings, the largest share
     rate, low, high = (best[f"rating{end}"] / 1e3 for end in ("", "_lower", "_upper"))
     ends = f" (95 % interval {text.number(low)} .. {FEW if math.isinf(high) else f'{text.number(high)} kN'})"
     if rate > 0.0:
@@ -237,10 +234,11 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
     if lives.unrated < lives.valid:
         factors = f"a_1 = {A1[bearing.reliability]:g}"
         factors += "" if bearing.a_iso is None else f", a_ISO = {bearing.a_iso:g}"
+        all_pins = text.in_words(len(lives.pins))
         yield (
             f"{100.0 * bearing.reliability:g} % of equal joints reach their life {bearing.symbol} (C = "
-            f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; all four: until the "
-            "first of the four bearings fails, Weibull slope 9/8"
+            f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; "
+            f"all {all_pins}: until the first of the {all_pins} bearings fails, Weibull slope 9/8"
         )
     if len(lives.duty) > 1:
         times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())

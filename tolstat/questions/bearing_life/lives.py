@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.common.load_kinds import PINS
+from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
@@ -21,10 +21,9 @@ from tolstat.store import recorded
 from tolstat.store.view import View
 
 JOINT = "joint"
-PLACES = (*PINS, JOINT)
-"""Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
+"""The joint: it lasts until the first of its bearings fails."""
 ANY = "any"
-"""At least one of the four bearings."""
+"""At least one of the bearings."""
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints that reach a life."""
 CONFIDENCE = 0.95
@@ -47,11 +46,13 @@ class Lives:
         Section ``[bearing]`` of the joint.
     duty : dict of str to float
         Share of the service time at each operating point; their sum is 1.
-    loads : ndarray, shape (n, 4)
+    pins : tuple of str
+        Pins, which bearings are named by.
+    loads : ndarray, shape (n, pins)
         Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
-    hours : ndarray, shape (n, 5)
-        Life of each bearing and of the joint, as in `PLACES`, h; NaN without a result or without a rating.
-    nominal_loads, nominal_hours : ndarray, shape (4,) and (5,)
+    hours : ndarray, shape (n, pins + 1)
+        Life of each bearing and of the joint, as in `places`, h; NaN without a result or without a rating.
+    nominal_loads, nominal_hours : ndarray, shape (pins,) and (pins + 1,)
         The same of the nominal joint; NaN if there is none.
     short, fretting : dict of str to int
         Valid joints by operating point that swing by less than ``bearing.critical_amplitude`` there, and by less than
@@ -65,6 +66,7 @@ class Lives:
     view: View
     bearing: Bearing
     duty: Mapping[str, float]
+    pins: tuple[str, ...]
     loads: FloatArray
     hours: FloatArray
     nominal_loads: FloatArray
@@ -73,6 +75,11 @@ class Lives:
     fretting: Mapping[str, int]
     unrated: int
     load_error: float
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Pins, and `JOINT`."""
+        return (*self.pins, JOINT)
 
     @property
     def valid(self) -> int:
@@ -86,14 +93,14 @@ class Lives:
 
     def rate(self, place: str) -> Sample:
         """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
-        k = PLACES.index(place)
+        k = self.places.index(place)
         with np.errstate(divide="ignore"):
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
         return Sample.of(values, self.view.status, self.view.design, name=place, unit="1/h", nominal=nominal)
 
     def load(self, pin: str) -> Sample:
         """Dynamic equivalent load of a pin's bearing, N."""
-        k = PINS.index(pin)
+        k = self.pins.index(pin)
         nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
         return Sample.of(values, self.view.status, self.view.design, name=pin, unit="N", nominal=nominal)
 
@@ -120,6 +127,7 @@ def lives_of(view: View) -> Lives:
     """
     view.check()
     bearing, duty, stores = _bearing(view), view.shares_of_time, [part.store for part in view.parts]
+    pins = kinds(view.mechanism)["contact"].places
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
     operation = [recorded.operating_points(store) for store in stores]
     swings, speeds = (np.abs([rows[name] for rows in operation]) for name in ("alpha", "speed"))  # (points, rows)
@@ -131,8 +139,8 @@ def lives_of(view: View) -> Lives:
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([pins, rating_life.system_life(pins)])
+        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
+    hours = np.column_stack([of_pins, rating_life.system_life(of_pins)])
     small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
     hours[unrated] = np.nan
@@ -145,10 +153,11 @@ def lives_of(view: View) -> Lives:
         view=view,
         bearing=bearing,
         duty=dict(zip(view.points, duty.tolist(), strict=True)),
+        pins=pins,
         loads=load[skip:],
         hours=hours[skip:],
-        nominal_loads=load[0] if has_nominal else np.full(len(PINS), np.nan),
-        nominal_hours=hours[0] if has_nominal else np.full(len(PLACES), np.nan),
+        nominal_loads=load[0] if has_nominal else np.full(len(pins), np.nan),
+        nominal_hours=hours[0] if has_nominal else np.full(len(pins) + 1, np.nan),
         short=short,
         fretting=fretting,
         unrated=int((unrated[skip:] & valid).sum()),
@@ -170,7 +179,7 @@ def _bearing(view: View) -> Bearing:
     if lacking := bearing.lacking(FOR_LIFE):
         incomplete = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
         raise unusable(view, incomplete, f"add to [bearing] of the joint, {again}")
-    if sum(column.field == "equivalent_load" for column in view.columns) < len(PINS):
+    if sum(column.field == "equivalent_load" for column in view.columns) < len(kinds(view.mechanism)["contact"].places):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)
     return bearing
@@ -179,7 +188,7 @@ def _bearing(view: View) -> Bearing:
 def _load_error(view: View) -> float:
     """Relative numerical error of an equivalent load, `analysis.accuracy.USUAL` of the checked joints; NaN if unknown.
 
-    It is estimated as that of largest loads (`analysis.accuracy.estimate`); the largest of the four bearings counts.
+    It is estimated as that of largest loads (`analysis.accuracy.estimate`); the largest of the bearings counts.
     """
     if view.verification is None:
         return np.nan
@@ -198,7 +207,7 @@ def life_rows(lives: Lives) -> Rows:
     Returns
     -------
     sequence of mapping
-        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
+        One row per place and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
         ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
         (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``; ``n``,
         ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
@@ -212,7 +221,7 @@ def life_rows(lives: Lives) -> Rows:
         return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
 
     rows = []
-    for rate in map(lives.rate, PLACES):
+    for rate in map(lives.rate, lives.places):
         for share in SHARES:
             q = rate.quantile(share, CONFIDENCE)
             row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}
@@ -234,7 +243,7 @@ def load_rows(lives: Lives) -> Rows:
     """
     return [
         {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
-        for pin, load in zip(PINS, map(lives.load, PINS), strict=True)
+        for pin, load in zip(lives.pins, map(lives.load, lives.pins), strict=True)
         for share in SHARES
     ]
 
@@ -245,14 +254,14 @@ def below_rows(lives: Lives) -> Rows:
     Returns
     -------
     sequence of mapping
-        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
+        One row per place: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
         its level (``count`` are the joints below the required life; bounds have joints without a life above and
         below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
         error), ``confidence``. No rows without a required life.
     """
     known = () if np.isnan(lives.load_error) else (max(0.0, 1.0 - lives.load_error), 1.0 + lives.load_error)
     rows = []
-    for place in PLACES if np.isfinite(lives.required) else ():
+    for place in lives.places if np.isfinite(lives.required) else ():
         rate, level = lives.rate(place), 1.0 / lives.required
         row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
         del row["level"]
@@ -274,15 +283,16 @@ def contact_rows(view: View) -> Rows:
         the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
         No rows if the study does not keep the contact modes.
     """
-    if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
+    every = kinds(view.mechanism)["contact"].places
+    if sum(column.field == "mode_share" for column in view.columns) < len(every) * len(Mode):
         return []
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
     spent = np.tensordot(view.shares_of_revolutions, np.stack(modes), 1)
     rows = []
-    for pins in (*((pin,) for pin in PINS), PINS):
+    for pins in (*((pin,) for pin in every), every):
         row: dict[str, Any] = {"place": pins[0] if len(pins) == 1 else ANY}
         for name, mode in LOADED.items():
-            longest = spent[:, [PINS.index(pin) for pin in pins], mode].max(axis=1)
+            longest = spent[:, [every.index(pin) for pin in pins], mode].max(axis=1)
             above = Sample.of(longest, view.status, view.design).above(MOSTLY, CONFIDENCE)
             row |= with_ends(name, (above.estimate, above.lower, above.upper))
         rows.append(row)

@@ -149,7 +149,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
     parts += map(Sentence, _notes(of_errors, "" if view.altered else command))
-    stored = [name for name in revolution.followed(view, [load]) if held(view.store, histories_of([name]))]
+    followed, m = revolution.followed(view, [load]), view.mechanism
+    stored = [name for name in followed if held(view.store, histories_of([name], m))]
     parts += revolution.over_angle(view, stored)
     return Answer("causes", "Causes by error", parts, facts)
 

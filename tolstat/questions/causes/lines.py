@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table, has
@@ -154,7 +155,7 @@ def sentence(changed: shares.Lines, accepted: float = math.nan) -> str:
     if best is None:
         return ""
     is_half, other = best["step"] == HALF, f"{best['step']} in place of {best['size']}"
-    line = f"{_phrase(best)} ({best['size']})" if best["size"] else _phrase(best)
+    line = _phrase(best, changed.mechanism) + (f" ({best['size']})" if best["size"] else "")
     low, high = 100.0 * best["share_lower"], text.percent(best["share_upper"])
     share = f"{text.percent(best['share'])} ({low:.3g} to {high})"
     if not best["share"] > accepted:
@@ -163,7 +164,7 @@ def sentence(changed: shares.Lines, accepted: float = math.nan) -> str:
     least = min(exact.values(), key=lambda row: float(row["share"]), default=None)
     tried = f"{f'halving the {line}' if is_half else other} gives {share}"
     if least is not None and least["share"] <= accepted:
-        which = "" if least["line"] == best["line"] else f" the {_phrase(least)}"
+        which = "" if least["line"] == best["line"] else f" the {_phrase(least, changed.mechanism)}"
         what = "Halving a single line" if is_half else "Another fit"
         return f"{what} is not enough: {tried}, exact{which} {text.percent(least['share'])}"
     same = exact.get(best["line"])
@@ -221,14 +222,15 @@ def _notes(changed: shares.Lines) -> Iterator[str]:
         yield f"alone, in all: closed and total Sobol' index, from {pairs} pairs of joints; above: above {limit}"
 
 
-def _phrase(row: Row) -> str:
+def _phrase(row: Row, mechanism: Mechanism) -> str:
     """Line of the drawing in words: ``tilt tolerance of the holes``; ``tolerance "pin1.*"`` where it has none."""
-    kinds = {name.partition(".")[2].partition("_")[0] for name in row["names"]}
-    features = {name.partition(".")[0] for name in row["names"]}
-    bodies = {feature.rstrip("1234") for feature in features}
-    if len(kinds) > 1 or not kinds <= _KINDS or not bodies <= {"pin", "hole"} or len(features) % 4:
+    kinds = {name.rpartition(".")[2].partition("_")[0] for name in row["names"]}
+    features = {name.rpartition(".")[0] for name in row["names"]}
+    every = {"pins": {pair.pin for pair in mechanism.pairs}, "holes": {pair.hole for pair in mechanism.pairs}}
+    bodies = [word for word, names in every.items() if names <= features]
+    if len(kinds) > 1 or not kinds <= _KINDS or features != set().union(*(every[word] for word in bodies)):
         return f'tolerance "{row["line"]}"' if "." in row["line"] else f"tolerances of {row['line']}"
-    return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
+    return f"{kinds.pop()} tolerance of the {' and '.join(bodies)}"
 
 
 def _tornado(changed: shares.Lines, accepted: float) -> Panel:

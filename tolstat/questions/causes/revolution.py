@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import sensitivity
-from tolstat.common.channels import CHANNELS, histories_of
+from tolstat.common.channels import channels, histories_of
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import FloatArray, unit_text
 from tolstat.common.tables import Status
@@ -38,6 +38,8 @@ class Band(NamedTuple):
     ----------
     load : str
         Its name.
+    unit : str
+        Its SI unit.
     theta : ndarray, shape (k,)
         Input angles, rad.
     nominal : ndarray, shape (k,)
@@ -47,6 +49,7 @@ class Band(NamedTuple):
     """
 
     load: str
+    unit: str
     theta: FloatArray
     nominal: FloatArray
     spread: FloatArray
@@ -59,7 +62,7 @@ class Band(NamedTuple):
 
 def followed(view: View, names: Sequence[str]) -> list[str]:
     """Those of some loads that are followed over the input angle; of several operating points none."""
-    return [] if len(view.points) > 1 else [name for name in names if name in CHANNELS]
+    return [] if len(view.points) > 1 else [name for name in names if name in channels(view.mechanism)]
 
 
 def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[Part]:
@@ -70,7 +73,7 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
     view : View
         A campaign whose joints are drawn from tolerances.
     loads : sequence of str
-        Keys of `channels.CHANNELS`; without any, there are no parts.
+        Names in `channels.channels`; without any, there are no parts.
     joints : int
         Number of joints evaluated, the first settled ones. Without stored histories they are simulated again.
 
@@ -95,7 +98,7 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
         without_errors, values = np.split(found.loads[name], [len(nominal)])
         drawn = without_errors[0] if len(nominal) else np.full(values.shape[1], np.nan)
         quantiles = np.asarray(np.quantile(values, SPREAD, axis=0, method="inverted_cdf"))
-        band = Band(name, found.angles, drawn, quantiles)
+        band = Band(name, channels(view.mechanism)[name].unit, found.angles, drawn, quantiles)
         panels.append(_panel(band))
         index = sensitivity.first_order(x, values[:, band.peak], iid=view.design.independent)
         peaks.append(_at_peak(band, list(errors), index))
@@ -112,7 +115,8 @@ def begin_replay(view: View, asked: Asked) -> None:
         view.check_drawn()
         view.check()
         loads, (nominal, samples) = followed(view, view.leading), _evaluated(view, asked.replay)
-        if loads and len(samples) >= MIN_JOINTS and not revolutions.held(view.store, histories_of(loads)):
+        has_enough, histories = len(samples) >= MIN_JOINTS, histories_of(loads, view.mechanism)
+        if loads and has_enough and not revolutions.held(view.store, histories):
             revolutions.ahead(view.store, np.concatenate([nominal, view.slots(samples)]), asked.processes)
 
 
@@ -124,8 +128,8 @@ def _evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.in
 
 def _at_peak(band: Band, errors: Sequence[str], index: sensitivity.FirstOrder) -> str:
     """Sentence on the error that explains most of the variance of a load at its peak, alone; `index` there."""
-    top, unit = f"{band.load} has its peak at {math.degrees(band.theta[band.peak]):.0f}°", CHANNELS[band.load].unit
-    top += f", where 5 % of the joints exceed {text.value(band.spread[2, band.peak], unit)}"
+    top = f"{band.load} has its peak at {math.degrees(band.theta[band.peak]):.0f}°"
+    top += f", where 5 % of the joints exceed {text.value(band.spread[2, band.peak], band.unit)}"
     if np.isnan(index.estimate).all():
         return f"{top}."
     most = int(np.nanargmax(index.estimate))
@@ -135,7 +139,7 @@ def _at_peak(band: Band, errors: Sequence[str], index: sensitivity.FirstOrder) -
 
 
 def _panel(band: Band) -> Panel:
-    unit, (_, middle, high) = unit_text(CHANNELS[band.load].unit), band.spread
+    unit, (_, middle, high) = unit_text(band.unit), band.spread
     words = f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
     words += f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
     title = f"{band.load} over the revolution"
@@ -153,5 +157,5 @@ def _draw(ax: Axes, band: Band) -> None:
         look: Any = {"color": style.INK, "lw": 1.0, "ls": (0.0, (4.0, 2.0)), "label": "without errors"}
         ax.plot(theta, nominal, **look)
     ax.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60), xlabel="input shaft angle θ [deg]")
-    ax.set_ylabel(f"|{band.load}| [{unit_text(CHANNELS[band.load].unit)}]")
+    ax.set_ylabel(f"|{band.load}| [{unit_text(band.unit)}]")
     ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(nominal).max()))

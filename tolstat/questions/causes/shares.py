@@ -13,6 +13,7 @@ import numpy as np
 from tolstat.analysis import difference, exchanged
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
+from tolstat.common.mechanism import Mechanism
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
 from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, with_ends
@@ -49,11 +50,14 @@ class Lines(NamedTuple):
         One row per line that can be exchanged: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and
         total Sobol' index of the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event
         that it is above the level. NaN where they cannot be estimated.
+    mechanism : Mechanism
+        What is simulated.
     """
 
     facts: Mapping[str, Any]
     rows: Rows
     indices: Rows
+    mechanism: Mechanism
 
     @property
     def by_line(self) -> Rows:
@@ -136,7 +140,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     facts |= {"logarithmic": joints.load.long_tailed}
     facts |= {"settled": joints.settled([line for line in entries if line.label in decisive])}
     facts |= {"missing": [line.label for line in entries if line.label not in lines]}
-    return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
+    return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines), view.mechanism)
 
 
 class Joints(ChangedJoints):
@@ -229,12 +233,12 @@ class Joints(ChangedJoints):
 def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
     """Rows with the cost of the line after the step, and what that is more than as drawn."""
     tolerances = scaling.tolerances(study)
-    costs = prices_of(tolerances, table)
+    costs = prices_of(tolerances, study.mechanism, table)
     tolerance_of = {name: k for k, tolerance in enumerate(tolerances) for name in tolerance.names}
     for row in rows:
         by_feature: dict[tuple[int, str], float] = {}  # several errors of a feature are one width on the drawing
         for name, factor in widths.factors(study, Group(row["line"], row["names"]), row["step"]).items():
-            key = tolerance_of.get(name, -1), name.partition(".")[0]
+            key = tolerance_of.get(name, -1), name.rpartition(".")[0]
             by_feature[key] = min(factor, by_feature.get(key, np.inf))
         is_known = all(
             k >= 0 and factor > 0.0 and not costs[k].entries[feature].keep

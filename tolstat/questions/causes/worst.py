@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.columns import result_columns
 from tolstat.common.errors import Fault, InputError, NotApplicable
-from tolstat.common.loads import LOADS, FloatArray
+from tolstat.common.loads import FloatArray, load_of, loads_of
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, VALID, Status
 from tolstat.display.answer import Answer, Asked, Column, Part, Row, Rows, Sentence, Table
@@ -117,7 +117,7 @@ def joint_rows(view: View, by: str, n: int = 10) -> Rows:
     narrowed, name = view.narrowed(by)
     points = [narrowed.points[0]] * len(samples)
     if len(narrowed.parts) > 1:  # a load, whose largest value is at one of them
-        each = np.stack([LOADS[name].of(part.results)[samples] for part in narrowed.parts])
+        each = np.stack([load_of(name, view.mechanism).of(part.results)[samples] for part in narrowed.parts])
         points = [narrowed.points[k] for k in np.argmax(each, axis=0)]
     columns = {"row": view.rows(samples).tolist(), "value": values.tolist(), "point": points}
     columns["status"] = [Status(status).label for status in view.status[samples]]
@@ -134,13 +134,14 @@ def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray,
     view, name = view.narrowed(by)
     columns = {column.name: column for column in view.columns}
     if name in view.kept_loads:
-        values, unit = LOADS[name].of(view.results), LOADS[name].unit
+        load = load_of(name, view.mechanism)
+        values, unit = load.of(view.results), load.unit
     elif name in columns:
         column = columns[name]
         values, unit = column.of(view.read_results([column.field])).astype(np.float64), str(column.unit)
     else:
         known = [*view.kept_loads, *columns]
-        if name in LOADS or name in [column.name for column in RESULT_COLUMNS]:
+        if name in loads_of(view.mechanism) or name in [column.name for column in result_columns(view.mechanism)]:
             lacking = f"is not kept in {view.path}, see [output] results of its study"
             raise InputError([Fault(name, lacking, f"give one of: {', '.join(known)}")])
         raise InputError([Fault(name, "is neither a load nor a column of the results", did_you_mean(name, known))])

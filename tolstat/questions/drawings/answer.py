@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from numpy.typing import NDArray
 from tolstat import joint as joints
 from tolstat import study
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.load_kinds import PLACES
 from tolstat.common.loads import load_of
 from tolstat.common.strict import read_toml, validate
-from tolstat.common.tables import SIMULATED
+from tolstat.common.tables import SIMULATED, tables
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
+from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Row, Rows, Sentence
+from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.drawings import views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
@@ -58,23 +59,45 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
         Takes a note if there is no drawing.
     """
     with asked.noting("the joint is not drawn"):
-        place, title = load_of(load).place if load else PLACES[""], "The joint"
+        names, side, title = [""], True, "The joint"
         if load:
+            place = load_of(load, view.mechanism).place
+            names, side = [place.name], place.group not in ("cross", "pin")
             sample, which = view.load(load), "the largest loads"
             if sample.limit is not None:
                 which = f"{'most often above' if sample.above(sample.limit).count else 'nearest to'} its limit"
             title = f"{place.name or load}: {which}"
             title += f", at {view.point_of(load)}" if len(view.points) > 1 else ""
-        panel = _joint(view, [place.name], load)[place.view == "side"]
-        return replace(panel, key="joint-worst", title=title)
+        drawn = _joints(view, names, load)
+        before = next((before for before in drawn if names[0].startswith(before)), next(iter(drawn)))
+        return replace(drawn[before][side], key="joint-worst", title=title)
     return None
 
 
-def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
-    """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
-    point = view.point_of(load) if load else view.points[0]
-    front, side = views.views(recorded.joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
-    return front, replace(side, title=f"{side.title}, at {point}") if point else side
+def _joints(view: View, marked: Collection[str], load: str) -> dict[str, tuple[Panel, Panel]]:
+    """Front and side view of each Cardan joint at the operating point at which a load matters most, else at the first.
+
+    By what stands before the names of its parts, see `views.joints_in`.
+    """
+    point, joint = view.point_of(load) if load else view.points[0], recorded.joint_of(view.store, 0)
+    alphas, drawn = _misalignments(joint, view.at(point).store.operation), {}
+    for before, alpha in zip(views.joints_in(tables(view.mechanism).ERROR), alphas, strict=True):
+        own = [name.removeprefix(before) for name in marked if name.startswith(before)]
+        front, side = _named(views.views(joint, alpha, own), before)
+        drawn[before] = front, replace(side, title=f"{side.title}, at {point}") if point else side
+    return drawn
+
+
+def _misalignments(joint: joints.Joint, operation: joints.Operation) -> list[float]:
+    """Misalignment of each Cardan joint, rad."""
+    angles: list[float] = perturb(joint, operation, nominal_errors(1, operation.mechanism))["alpha"][0].tolist()
+    return angles
+
+
+def _named(panels: tuple[Panel, Panel], before: str) -> list[Panel]:
+    """Drawings with the name of their joint, of several."""
+    name = before.rstrip(".")
+    return [replace(p, key=f"{p.key}-{name}", title=f"{name}: {p.title}") if name else p for p in panels]
 
 
 def drawings(view: View) -> Answer:
@@ -91,9 +114,10 @@ def drawings(view: View) -> Answer:
         Pictures: the joint from all sides, with the places of the leading loads marked; the kinds of its errors; errors
         of the joints with the largest leading loads, enlarged.
     """
-    marked = sorted({load_of(name).place.name for name in view.leading} - {""})
+    marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
     kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
-    parts: list[Part] = [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Sentence(LEGEND)]
+    drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
+    parts: list[Part] = [Panels([*drawn, kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
     return Answer("drawings", "The joint and its errors, drawn", parts)
@@ -111,13 +135,23 @@ def _worst(view: View) -> list[Panel]:
     for sample, words in loads.items():
         joint, row = recorded.joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
-        panels.append(views.errors_of(joint, errors, title, f"drawn-{row}"))
+        panels += _errors_of(joint, errors, title, f"drawn-{row}")
+    return panels
+
+
+def _errors_of(joint: joints.Joint, errors: NDArray[np.void], title: str, key: str) -> list[Panel]:
+    """Drawing of the errors of each Cardan joint of one mechanism."""
+    panels = []
+    for before in views.joints_in(errors.dtype):
+        name, own = before.rstrip("."), views.errors_in(errors, before)
+        of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
+        panels.append(views.errors_of(joint, own, f"{of}{title}", f"{key}{suffix}"))
     return panels
 
 
 def read(
     source: str | Path, row: int | None = None, alpha: str | None = None
-) -> tuple[joints.Joint, float, str, NDArray[np.void] | None]:
+) -> tuple[joints.Joint, list[float], str, NDArray[np.void] | None]:
     """Read the joint to be drawn.
 
     Parameters
@@ -127,14 +161,15 @@ def read(
     row : int, optional
         Row of the campaign whose errors are drawn; of a result file.
     alpha : str, optional
-        Misalignment in place of the source's own, ``"20 deg"``; a joint file has none: 15 deg by default.
+        Misalignment in place of the source's own, ``"20 deg"``, of joints in series that of the first; a joint file has
+        none: 15 deg by default.
 
     Returns
     -------
     joint : Joint
         The nominal joint; of a result file that of its first slot, or of the row.
-    alpha : float
-        Its misalignment, rad; of several operating points that of the first.
+    alphas : list of float
+        Its misalignment, rad, of joints in series that of each; of several operating points those of the first.
     title : str
         A headline.
     errors : ndarray, shape (1,), dtype ERROR, or None
@@ -156,7 +191,8 @@ def read(
                 remedy = f"give one of these rows, for example --row {store.rows[0]}"
                 raise InputError([Fault(str(path), holds, remedy)])
             first, slot, title = store.each()[0], 0 if row is None else store.slot(row), store.study_name
-            joint, own_alpha = recorded.joint_of(store, slot), recorded.operation_of(first, slot).alpha
+            joint = recorded.joint_of(store, slot)
+            alphas = _misalignments(joint, recorded.operation_of(first, slot))
             if row is None:
                 point = first.point or ""
             else:
@@ -165,23 +201,26 @@ def read(
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
     elif path.suffix == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
         case = study.load(path) if "sampling" in data else study.load_case(path)
-        joint, own_alpha, title = case.joint, case.operation.alpha, path.stem
+        joint, title = case.joint, path.stem
+        alphas = _misalignments(joint, case.operation)
         point = case.points[0].name if isinstance(case, study.Study) else ""
     else:
-        joint, own_alpha = joints.load(source, {}, str(source)), asked_alpha
+        joint, alphas = joints.load(source, {}, str(source)), [asked_alpha]
         title = joint.description or path.stem
-    return joint, asked_alpha if alpha else own_alpha, f"{title}, at {point}" if point else title, errors
+    if alpha:
+        alphas[0] = asked_alpha
+    return joint, alphas, f"{title}, at {point}" if point else title, errors
 
 
-def draw_joint(joint: joints.Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
+def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str = "", columns: int = 2) -> Figure:
     """Draw a joint from its dimensions: the cross in its holes, both shafts, bushings, dimensions.
 
     Parameters
     ----------
     joint : Joint
         The nominal joint, such as ``study.joint``.
-    alpha : float
-        Misalignment, rad.
+    alpha : float or sequence of float
+        Misalignment, rad; of joints in series that of each.
     title : str
         Headline; the joint's description by default.
     columns : int
@@ -192,7 +231,11 @@ def draw_joint(joint: joints.Joint, alpha: float, title: str = "", columns: int 
     matplotlib.figure.Figure
         Its parts have their names as ids in an SVG.
     """
-    return drawing.sheet(views.views(joint, alpha), title or joint.description or "Cardan joint", NOTES, columns)
+    alphas = np.atleast_1d(alpha).tolist()
+    names = [f"joint{i}." for i in range(1, len(alphas) + 1)] if len(alphas) > 1 else [""]
+    each = [_named(views.views(joint, own), name) for own, name in zip(alphas, names, strict=True)]
+    panels = list(chain.from_iterable(each))
+    return drawing.sheet(panels, title or joint.description or "Cardan joint", NOTES, columns)
 
 
 def draw_errors(joint: joints.Joint) -> Figure:
@@ -212,11 +255,20 @@ def draw_row(joint: joints.Joint, errors: NDArray[np.void], title: str = "") -> 
     title : str
         Headline.
     """
-    panel = views.errors_of(joint, errors, "Seen along z and along t of each pin", "row")
-    return drawing.sheet([panel], title or "Errors of one joint", ROW)
+    panels = _errors_of(joint, errors, "Seen along z and along t of each pin", "row")
+    return drawing.sheet(panels, title or "Errors of one joint", ROW)
 
 
-def lengths(joint: joints.Joint, alpha: float) -> Rows:
+def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
+    """Errors of each pin and hole of one joint, see `views.numbers`; names as in `errors`."""
+    rows = list[Row]()
+    for before in views.joints_in(errors.dtype):
+        own = views.numbers(joint, views.errors_in(errors, before))
+        rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
+    return rows
+
+
+def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
     """Dimensions on the drawing: ``dimension``, ``value`` with its unit, ``meaning``."""
     arm, contact = joint.arm, joint.contact
     rows = [
@@ -234,7 +286,8 @@ def lengths(joint: joints.Joint, alpha: float) -> Rows:
         ("arm.d", arm.d, "diameter of a round arm"),
     ]
     shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
-    shown.append(("operation.alpha", f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
+    for key, alpha in zip(("operation.alpha", "series.alpha"), alphas, strict=False):
+        shown.append((key, f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
     return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in shown]
 
 

@@ -1,4 +1,4 @@
-"""Drawings of a joint from its own dimensions: front and side view, the kinds of errors, the errors of one joint.
+"""Drawings of a Cardan joint from its dimensions: front and side view, the kinds of errors, the errors of one joint.
 
 Coordinates are metres of the joint at the input angle 0, distances of labels points. Parts are named, so that they are
 found in an SVG.
@@ -13,9 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import HOLE_OF_PIN
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
+from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
@@ -83,6 +81,20 @@ Cell = tuple[str, str, Array, dict[str, tuple[Pair, Look]]]
 """Drawing of a pin in its hole: a headline, words, direction of view, pairs by name and how they look."""
 
 
+def joints_in(table: np.dtype[np.void]) -> list[str]:
+    """What stands before the names of the parts of each Cardan joint of a mechanism, ``"joint1."``; `table`: ERROR."""
+    first = f"{CARDAN.pairs[0].pin}.diameter"
+    return [name.removesuffix(first) for name in table.names or () if name.endswith(first)]
+
+
+def errors_in(errors: NDArray[np.void], before: str) -> NDArray[np.void]:
+    """Errors of a Cardan joint of one mechanism, (1,) table ERROR of `CARDAN`; `before` as of `joints_in`."""
+    of_joint = nominal_errors(1, CARDAN)
+    for name in of_joint.dtype.names or ():
+        of_joint[name] = errors[f"{before}{name}" if f"{before}{name}" in (errors.dtype.names or ()) else name]
+    return of_joint
+
+
 def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     """Pins 1 to 4 with the holes that they turn in, of one joint; an error of the clearance widens the hole.
 
@@ -90,25 +102,25 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     ----------
     joint : Joint
         The nominal joint.
-    errors : ndarray, shape (1,), dtype ERROR
+    errors : ndarray, shape (1,), dtype ERROR of `CARDAN`
         Its errors.
     """
     par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
     pairs_of_joint = []
-    for i, number in enumerate(HOLE_OF_PIN):
-        hole, t, u = HOLES[number - 1], perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[number - 1]
-        thick = joint.contact.D_P + float(errors[f"{PINS[i]}.diameter"][0])
-        pin = Feature(PINS[i], thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
+    for i, (pair, number) in enumerate(zip(CARDAN.pairs, HOLE_OF_PIN, strict=True)):
+        t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[number - 1]
+        thick = joint.contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
+        pin = Feature(pair.pin, thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
-        pairs_of_joint.append((pin, Feature(hole, wide, u @ par["hole_point"][i], u @ par["hole_axis"][i])))
+        pairs_of_joint.append((pin, Feature(pair.hole, wide, u @ par["hole_point"][i], u @ par["hole_axis"][i])))
     return pairs_of_joint
 
 
 def positive(joint: Joint, kind: str) -> Pair:
     """Pin 1 and hole 4, both with a positive error of one kind, large enough to be drawn as it is."""
-    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), nominal_errors(1)
+    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), nominal_errors(1, CARDAN)
     sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
-    for name in (PINS[0], HOLES[HOLE_OF_PIN[0] - 1]):
+    for name in CARDAN.pairs[0][:2]:
         errors[f"{name}.{kind}"] = sizes[kind.partition("_")[0]]
     return pairs(joint, errors)[0]
 
@@ -155,7 +167,7 @@ def kinds_of_errors(joint: Joint) -> Panel:
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     solid: Look = {"edgecolor": COLOURS[0]}
     dashed: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none"}
-    cells, ideal = list[Cell](), pairs(joint, nominal_errors(1))[0]
+    cells, ideal = list[Cell](), pairs(joint, nominal_errors(1, CARDAN))[0]
     for kind, meaning in MEANINGS.items():
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
         both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}
@@ -168,7 +180,7 @@ def errors_of(joint: Joint, errors: NDArray[np.void], title: str, key: str) -> P
     """Errors of one joint, enlarged: pins 1 to 4 in their holes, while cross and forks are in their ideal place.
 
     Along a pin, the shift of its axis is enlarged: where pin and hole overlap, they would do so in this place. The
-    largest error or clearance is drawn as a sixth to a quarter of the pin's size. `errors` has shape (1,), dtype ERROR.
+    largest error or clearance is drawn as a sixth to a quarter of the pin's size. `errors` as in `pairs`.
     """
     both, z = pairs(joint, errors), joint.contact.z
     moved = [abs(feature.ends(z) - feature.ends(z, 0.0)).max() for pair in both for feature in pair]

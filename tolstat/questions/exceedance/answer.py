@@ -134,7 +134,9 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
     if any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for other, row in zip(others, rows, strict=True)):
         title = "What makes the shares above limits uncertain, in per cent of the joints"
-        parts.append(Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate")))
+        parts.append(
+            Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate", view.mechanism))
+        )
     return Answer("limits", "Each limit", parts)
 
 
@@ -175,13 +177,14 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     rows, is_judged = of.limit_rows(view), not math.isnan(accepted)
     if is_judged:
         rows = [{**row, "verdict": WORDS[of.verdict(row, accepted)]} for row in rows]
-    seen = one_force(rows, "level", "estimate")
+    seen = one_force(rows, "level", "estimate", view.mechanism)
     verdicts = [of.verdict(row, accepted) for row in seen] if is_judged else ()
     tables = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
         columns = [LIMITS[0], LIMITS[2], *(Column(point, shares.share(point)) for point in view.points)]
-        tables.append(Table("at_points", title, columns, points, seen=one_force(points, "level", view.points[0])))
+        seen = one_force(points, "level", view.points[0], view.mechanism)
+        tables.append(Table("at_points", title, columns, points, seen=seen))
     return tables
 
 
@@ -228,7 +231,11 @@ def note(view: View) -> str:
 
 def _beyond(view: View) -> str:
     """Why the force without errors is smaller than T/(2 R); empty where it is not, or at several operating points."""
-    forces = [view.load(name).nominal for name in ("cross1.F", "cross2.F") if name in view.bushing_loads]
+    mechanism = view.mechanism
+    holes = {lump.name for lump in mechanism.lumps if lump.member == mechanism.shafts[-1].member}
+    pins = {pair.pin for pair in mechanism.pairs if pair.hole in holes}
+    names = [f"{bushing.name}.F" for bushing in mechanism.bushings if bushing.lump in pins]
+    forces = [view.load(name).nominal for name in names if name in view.bushing_loads]
     if not forces or len(view.points) > 1:
         return ""
     torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R

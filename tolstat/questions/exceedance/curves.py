@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.sample import Sample
 from tolstat.common.load_kinds import Kind
-from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
+from tolstat.common.loads import QUANTITY, load_of, names_of, panels
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
 from tolstat.display.style import lines, ticker
@@ -38,22 +38,24 @@ def sheet(view: View, notes: Sequence[str]) -> Figure:
     Returns
     -------
     Figure
-        Four panels, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
+        A panel for each group and kind, empty where no load is kept; share of the joints on a logarithmic axis down to
+        half a joint.
     """
     title = f"{view.name}: share of joints whose largest load exceeds x"
-    return drawing.sheet([_group_panel(view, *panel) for panel in PANELS], title, notes, columns=2)
+    return drawing.sheet([_group_panel(view, *panel) for panel in panels(view.mechanism)], title, notes, columns=2)
 
 
 def _group_panel(view: View, group: str, kind: Kind) -> Panel:
-    """Curves of one kind of loads at the cross or fork bushings."""
-    samples = {i: view.load(x) for i, x in enumerate(names_of(group, kind)) if x in view.bushing_loads}
+    """Curves of one kind of loads at the bushings of a group."""
+    names = names_of(group, kind, view.mechanism)
+    samples = {i: view.load(x) for i, x in enumerate(names) if x in view.bushing_loads}
     loads = {i: load for i, load in samples.items() if load.valid.size}
 
     def draw(ax: Axes) -> None:
         if not loads:
             drawing.empty(ax, "no joint with a valid result" if samples else "not kept by the study")
             return
-        high, _ = _draw(ax, loads)
+        high, _ = _draw(ax, view, loads)
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit)
         ax.set(xlabel=f"x: largest |{kind.symbol}| over the revolution [{unit}]", ylabel="share of joints above x")
         if view.design.has_intervals:
@@ -65,10 +67,10 @@ def _group_panel(view: View, group: str, kind: Kind) -> Panel:
     return Panel(f"exceedance-{group}-{kind.symbol}", title, title, draw, (drawing.WIDTH, 3.9))
 
 
-def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) -> tuple[float, float]:
+def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) -> tuple[float, float]:
     """Draw curves with bands, limits and nominal joints, and others thin; returns the largest load and share drawn.
 
-    `loads` by index of their colour; those of a panel have one unit. The share is the smallest.
+    `loads` by their number in the group; those of a panel have one unit. The share is the smallest.
     """
     tables = {i: curve(load, DRAWN_LEVELS) for i, load in loads.items()}
     thin = {other.name: curve(other, THIN_LEVELS) for other in others}
@@ -88,26 +90,33 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
     for i, table in tables.items():
-        _bands(ax, table, floor, style.COLOURS[i])
-        look: Any = {"color": style.COLOURS[i], "ls": style.DASHES[i], "zorder": 3, "label": loads[i].name}
+        look: Any = style.curve(i)
+        _bands(ax, table, floor, look["color"])
+        look |= {"zorder": 3, "label": loads[i].name}
         _step(ax, table, table["estimate"], floor, **look)
     for i in tables:
         if low <= loads[i].nominal <= high:
-            style.mark(ax, loads[i].nominal, 1.0, style.COLOURS[i])
+            style.mark(ax, loads[i].nominal, 1.0, style.curve(i)["color"])
     for name, table in thin.items():
-        dash = "-" if load_of(name).place.group == "cross" else (0.0, (4.0, 1.5))
+        dash = "-" if load_of(name, view.mechanism).place.group == _groups(view)[0] else (0.0, (4.0, 1.5))
         line = _step(ax, table, table["estimate"], floor, color=style.FAINT, lw=0.7, ls=dash)
         drawing.switched(line, "others")
     for level, which in sorted(limits.items()):
         of = "" if len(which) == len(loads) else f" ({', '.join(str(i + 1) for i in which)})"
         beyond = " →" if level > high else " ←" if level < low else ""
-        look = {"color": style.COLOURS[which[0]] if len(which) == 1 < len(loads) else style.INK, "lw": 1.4, "zorder": 2}
+        colour = style.curve(which[0])["color"] if len(which) == 1 < len(loads) else style.INK
+        look = {"color": colour, "lw": 1.4, "zorder": 2}
         look |= {"ls": LIMIT_DASH, "label": f"limit {text.value(level, loads[which[0]].unit)}{of}{beyond}"}
         if beyond:
             ax.plot([], [], **look)
         else:
             ax.axvline(level, **look)
     return high, floor
+
+
+def _groups(view: View) -> list[str]:
+    """Groups of bushings; thin curves of the first one are solid, those of others dashed."""
+    return list(dict.fromkeys(group for group, _ in panels(view.mechanism)))
 
 
 def _steps(ax: Axes, table: NDArray[np.void]) -> NDArray[np.float64]:
@@ -135,8 +144,10 @@ def leading_panel(view: View, name: str) -> Panel:
     """Curve of a leading load with its band; on switches the other bushings, and a band for the whole curve."""
     load, plain = view.load(name), view.narrowed(name)[1]
     others = [other for other in view.bushing_loads if other != plain and plain in view.bushing_loads]
-    others = [f"{other}{name.removeprefix(plain)}" for other in others if LOADS[other].kind == LOADS[plain].kind]
-    switches = [("others", "other bushings, without bands (cross solid, fork dashed)")] if others else []
+    kind_of = {other: load_of(other, view.mechanism).kind for other in (*others, plain)}
+    others = [f"{other}{name.removeprefix(plain)}" for other in others if kind_of[other] == kind_of[plain]]
+    dashes = ", ".join(f"{group} {'dashed' if i else 'solid'}" for i, group in enumerate(_groups(view)))
+    switches = [("others", f"other bushings, without bands ({dashes})")] if others else []
     if view.design.independent:
         switches.append(("curve-band", "95 % band for the whole curve (DKW)"))
     description = "no joint with a valid result"
@@ -149,7 +160,7 @@ def leading_panel(view: View, name: str) -> Panel:
         if not load.valid.size:
             drawing.empty(ax, "no joint with a valid result")
             return
-        high, floor = _draw(ax, {0: load}, [other for other in view.loads(others) if other.valid.size])
+        high, floor = _draw(ax, view, {0: load}, [other for other in view.loads(others) if other.valid.size])
         if view.design.independent:
             table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
             for end in (table["bound_upper"] + half, table["bound_lower"] - half):

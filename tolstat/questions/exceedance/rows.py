@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
-from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
+from tolstat.common.loads import ANY_LIMIT, load_of, shown_loads, unit_text
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
 from tolstat.display.verdict import side_of
@@ -88,7 +88,7 @@ def point_rows(view: View) -> Rows:
             loads = {part.points[0]: part.load(plain) for part in at.parts}
             shares = {p: load.above(level).estimate for p, load in loads.items()}
             blank = dict.fromkeys(view.points, np.nan)
-            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | blank | shares)
+            rows.append({"load": name, "unit": load_of(name, view.mechanism).unit, "level": level} | blank | shares)
     return rows
 
 
@@ -175,7 +175,7 @@ def readings(view: View) -> dict[str, Any]:
 
 def not_kept(view: View) -> str:
     """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
-    names = [name for name in SHOWN_LOADS if name not in view.bushing_loads]
+    names = [name for name in shown_loads(view.mechanism) if name not in view.bushing_loads]
     return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 

@@ -13,6 +13,7 @@ from tolstat.analysis import binomial, prediction, strength
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text, verdict
 from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
@@ -45,10 +46,10 @@ def _life(*lives: float) -> str:
     return "-" if math.isnan(lives[0]) else " .. ".join(ends)
 
 
-def _line_of_load(row: Row) -> str:
+def _line_of_load(row: Row, mechanism: Mechanism) -> str:
     if row["channel"] == counting.ANY:
         return "-"
-    return f"{text.value(row['S0'], unit_of(row['channel']))} at {row['N0']:g} cycles, m = {row['m']:g}"
+    return f"{text.value(row['S0'], unit_of(row['channel'], mechanism))} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
 _LAST = SHARES[-1]
@@ -76,18 +77,21 @@ LOADS = (
     ),
 )
 """Columns of the table ``loads``, arranged by channel and exponent."""
-DAMAGES = (
-    Column("channel", lambda row: str(row["channel"])),
-    Column("S–N line", _line_of_load, words=True, rank=3),
-    Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=2),
-    Column("median", lambda row: text.formed(row["median"]), rank=1),
-    Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
-    Column("share", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=4),
-    Column("above in delivery", text.delivery, rank=5),
-)
-"""Columns of the table ``damages``. Joints above 1 are counted among the settled ones, as the share is."""
+
+
+def _damages(mechanism: Mechanism) -> tuple[Column, ...]:
+    """Columns of the table ``damages``. Joints above 1 are counted among the settled ones, as the share is."""
+    return (
+        Column("channel", lambda row: str(row["channel"])),
+        Column("S–N line", partial(_line_of_load, mechanism=mechanism), words=True, rank=3),
+        Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=2),
+        Column("median", lambda row: text.formed(row["median"]), rank=1),
+        Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+        Column("share", lambda row: text.percent(row["estimate"])),
+        Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+        Column("ppm", lambda row: text.ppm(row["estimate"]), rank=4),
+        Column("above in delivery", text.delivery, rank=5),
+    )
 
 
 def fatigue(
@@ -144,9 +148,9 @@ def fatigue(
         stressed = parts.load_stresses(view, joints)
         duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or settings.lines or not settings.points:
-        loading = load_cycles(view, channels(by) if by else None, joints)
+        loading = load_cycles(view, channels(by, view.mechanism) if by else None, joints)
         rows = loads.equivalent_loads(loading)
-        shown = [] if by else loads.most_loaded(rows)
+        shown = [] if by else loads.most_loaded(rows, view.mechanism)
         seen = [row for row in rows if not shown or row["channel"] in shown]
         duty, shown_parts = loading.duty, [*shown_parts, *_of_loads(loading, rows, seen, delivery)]
     return Answer("fatigue", "Fatigue", shown_parts, {"duty": dict(duty)} if len(duty) > 1 else {})
@@ -166,7 +170,7 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
             if (settings.lines or view.store.history_specs) and joints:
                 loading = load_cycles(view, samples=joints)
                 rows = loads.equivalent_loads(loading)
-                leading = loads.leading(rows)
+                leading = loads.leading(rows, view.mechanism)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
                 shown_parts += _of_loads(loading, rows, seen, prediction.DELIVERY)
     if not shown_parts:
@@ -211,7 +215,7 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
 
 def _joints_with_lines(view: View, settings: Fatigue, again: int) -> int:
     """Number of joints evaluated by loads; at most `again` where they have to be simulated again for an S–N line."""
-    signals = [signal for name in settings.lines for signal in signals_of(name)]
+    signals = [signal for name in settings.lines for signal in signals_of(name, view.mechanism)]
     return JOINTS if counting.held(view.store, signals) else min(again, JOINTS)
 
 
@@ -258,13 +262,13 @@ def _of_loads(loading: counting.Counted, rows: Rows, seen: Rows, delivery: int) 
             partial(_draw_spectrum, loading=loading, channel=channel),
             (drawing.WIDTH, 3.5),
         )
-        for channel in loads.leading(rows)
+        for channel in loads.leading(rows, loading.mechanism)
     ]
     shown_parts: list[Part] = [Panels(panels)] if panels else []
     shown_parts.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
     if damages := loads.damages(loading, delivery):
         title = "Damage sum of the service life, and share of the joints where it exceeds 1"
-        shown_parts.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
+        shown_parts.append(Table("damages", title, _damages(loading.mechanism), damages, {"S0": "N or N*m"}))
     return [*shown_parts, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
@@ -362,5 +366,5 @@ def _draw_spectrum(ax: Axes, loading: counting.Counted, channel: str) -> None:
         axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(ticker.NullFormatter())
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
-    unit = unit_text(unit_of(channel))
+    unit = unit_text(unit_of(channel, loading.mechanism))
     ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles, Transitions
 from tolstat.analysis.design import Design
-from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, LoadHistory, Signal
+from tolstat.common.channels import BUSHING_LOADS, Signal, components, load_histories
 from tolstat.common.loads import FloatArray
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Status
 from tolstat.display.text import percent
 from tolstat.solver import histories
@@ -38,6 +39,8 @@ class Joints:
         How the joints were drawn.
     settings : Fatigue
         Section ``[fatigue]`` of the study, see `settings_of`.
+    mechanism : Mechanism
+        What is simulated.
     total : int
         Number of samples of the campaign, those not evaluated included.
     duty : tuple of (str, float)
@@ -47,6 +50,7 @@ class Joints:
     status: NDArray[np.uint8]
     design: Design
     settings: Fatigue
+    mechanism: Mechanism
     total: int
     duty: tuple[tuple[str, float], ...]
 
@@ -115,6 +119,7 @@ def joints_of(view: View, samples: int | None) -> Joints:
         status=view.status[:samples],
         design=view.design if samples is None else view.design.only(np.arange(min(samples, view.n))),
         settings=settings_of(view),
+        mechanism=view.mechanism,
         total=view.n,
         duty=tuple(zip(view.points if several else (view.points[0] or view.path.name,), shares, strict=True)),
     )
@@ -201,7 +206,8 @@ def count(
 
 def held(store: reader.Reader, signals: Sequence[Signal]) -> bool:
     """Whether a file holds cycles of these signals, or the loads that they are counted from."""
-    return revolutions.held(store, LOAD_HISTORIES) != "" or all(_is_stored(store, signal) for signal in signals)
+    of_loads = tuple(load_histories(store.mechanism).values())
+    return revolutions.held(store, of_loads) != "" or all(_is_stored(store, signal) for signal in signals)
 
 
 def of_slots(
@@ -233,21 +239,21 @@ def of_slots(
 
 
 def _is_stored(store: reader.Reader, signal: Signal) -> bool:
-    return signal.name in COMPONENTS and f"{signal.history.prefix}cycles" in store.history_specs
+    return signal.name in components(store.mechanism) and f"{signal.history.prefix}cycles" in store.history_specs
 
 
 def _stored(
     store: reader.Reader, slots: NDArray[np.intp], signals: Sequence[Signal]
 ) -> tuple[NDArray[np.floating], FloatArray]:
     """Cycles that workers stored, (m, signals, k, 2), and their numbers, (m, signals)."""
-    tables, numbers = [], []
-    for history in LOAD_HISTORIES:
-        of_history = [signal.name for signal in COMPONENTS.values() if signal.history == history]
+    tables, numbers, found = [], [], load_histories(store.mechanism).values()
+    for history in found:
+        of_history = [name for name, signal in components(store.mechanism).items() if signal.history == history]
         columns = [of_history.index(signal.name) for signal in signals if signal.history == history]
         if columns:
             tables.append(store.histories(f"{history.prefix}cycles", slots)[:, columns])
             numbers.append(store.histories(f"{history.prefix}cycle_count", slots)[:, columns])
-    order = np.argsort([i for h in LOAD_HISTORIES for i, signal in enumerate(signals) if signal.history == h])
+    order = np.argsort([i for h in found for i, signal in enumerate(signals) if signal.history == h])
     table, number = (np.concatenate(each, axis=1)[:, order] for each in (tables, numbers))
     return table[:, :, : max(1, int(number.max(initial=0)))], number.astype(float)
 
@@ -256,13 +262,14 @@ def _counted(
     store: reader.Reader, slots: NDArray[np.intp], signals: tuple[Signal, ...], kept: int
 ) -> tuple[tuple[NDArray[np.floating], FloatArray], float]:
     """Cycles as in `_stored`, counted from loads that the file holds or from joints simulated again."""
-    used: list[LoadHistory] = [h for h in LOAD_HISTORIES if h == BUSHING_LOADS or any(s.history == h for s in signals)]
+    found = load_histories(store.mechanism)
+    used = [h for h in found.values() if h.name == BUSHING_LOADS or any(s.history == h for s in signals)]
     tables, numbers, apart = list[FloatArray](), list[FloatArray](), 0.0
     for _, loads, difference in revolutions.of_components(store, slots, used):
         apart = max(apart, difference)
-        for joint in range(len(loads[BUSHING_LOADS.name])):
+        for joint in range(len(loads[BUSHING_LOADS])):
             own = {name: values[joint] for name, values in loads.items()}
-            ranges, means, number = histories.count(own, signals, kept)
+            ranges, means, number = histories.count(own, signals, kept, store.mechanism)
             table = np.stack([ranges, means], axis=-1)[None, :, : max(1, int(number.max(initial=0)))]
             finite = all(np.isfinite(values).all() for values in own.values())  # else it failed, simulated again
             tables.append(table if finite else np.full_like(table, np.nan))

@@ -9,10 +9,12 @@ import numpy as np
 
 from tolstat.analysis import cycles, prediction
 from tolstat.analysis.sample import Sample
-from tolstat.common import load_kinds, loads
-from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, signals_of, unit_of
+from tolstat.common import loads
+from tolstat.common.channels import BUSHING_LOADS, components, signals_of, unit_of
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.late import pandas as pd
+from tolstat.common.load_kinds import places
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import SIMULATED
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import counting
@@ -25,11 +27,9 @@ SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles are given."""
 MAX_NUMBERS = 40
 """Maximum number of points of a spectrum."""
-SHOWN = tuple(signal.name for signal in COMPONENTS.values() if signal.history == BUSHING_LOADS)
-"""Components that are evaluated unless others are asked for."""
 
 
-def channels(patterns: Sequence[str]) -> tuple[str, ...]:
+def channels(patterns: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
     """Names of the components and directions that any of the patterns selects.
 
     Raises
@@ -37,12 +37,12 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     InputError
         With every pattern that selects nothing, or what has no sign.
     """
-    names, faults, order = dict[str, None](), list[Fault](), list(COMPONENTS)
+    names, faults, order = dict[str, None](), list[Fault](), list(components(mechanism))
     for pattern in patterns:
         with gather(faults):
-            names |= dict.fromkeys(counted_names(Entry(pattern, (pattern,), None), "--by"))
+            names |= dict.fromkeys(counted_names(Entry(pattern, (pattern,), None), "--by", mechanism))
     raise_all(faults)
-    return tuple(sorted(names, key=lambda name: order.index(name) if name in COMPONENTS else len(order)))
+    return tuple(sorted(names, key=lambda name: order.index(name) if name in order else len(order)))
 
 
 def load_cycles(view: View, names: Sequence[str] | None = None, samples: int | None = None) -> Counted:
@@ -65,8 +65,9 @@ def load_cycles(view: View, names: Sequence[str] | None = None, samples: int | N
     """
     joints = counting.joints_of(view, samples)
     if names is None:
-        names = tuple(dict.fromkeys((*SHOWN, *joints.settings.lines)))
-    signals = [signal for name in names for signal in signals_of(name)]
+        of_bushings = (s.name for s in components(view.mechanism).values() if s.history.name == BUSHING_LOADS)
+        names = tuple(dict.fromkeys((*of_bushings, *joints.settings.lines)))
+    signals = [signal for name in names for signal in signals_of(name, view.mechanism)]
     simulated = np.all([np.isin(part.status[:samples], SIMULATED) for part in view.parts], axis=0)
     return counting.count(view, joints, signals, simulated)
 
@@ -95,7 +96,8 @@ def equivalent_loads(loading: Counted) -> Rows:
         )
         lacking = cycles.truncation_bound(worst, m)
         for c, channel in enumerate(worst.channels):
-            head = {"channel": channel, "unit": unit_of(channel), "m": m, "nominal": only(nominal[:, c])}
+            unit = unit_of(channel, loading.mechanism)
+            head = {"channel": channel, "unit": unit, "m": m, "nominal": only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
             rows += _quantiles(head, values[:, c], loading)
     return rows
@@ -157,7 +159,7 @@ def spectrum(loading: Counted, channel: str) -> Rows:
     numbers = np.unique(np.append(steps.round(12), 1.0))  # at which the spectra of the joints have steps
     numbers = numbers[np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)]
     values, nominal = (cycles.spectrum(each, numbers)[:, 0] for each in (part, nominal_part))
-    head, rows = {"channel": channel, "unit": unit_of(channel)}, list[Row]()
+    head, rows = {"channel": channel, "unit": unit_of(channel, loading.mechanism)}, list[Row]()
     for number, ranges, ideal in zip(numbers, values.T, nominal.T, strict=True):
         columns = {"nominal": only(ideal), "cycles": number * loading.settings.revolutions}
         rows += _quantiles(head | columns, ranges, loading)
@@ -169,7 +171,7 @@ def _middle(loading: Counted) -> float:
     return exponents[len(exponents) // 2]
 
 
-def most_loaded(rows: Rows) -> list[str]:
+def most_loaded(rows: Rows, mechanism: Mechanism) -> list[str]:
     """Channel with the largest equivalent load, a force and a moment at each place, from `equivalent_loads`.
 
     Evaluated at the middle exponent and the highest share. Empty if no joint has a valid result.
@@ -179,21 +181,21 @@ def most_loaded(rows: Rows) -> list[str]:
     largest: dict[tuple[str, str], Row] = {}
     for row in last:
         if not np.isnan(row["estimate"]):
-            key = signals_of(row["channel"])[0].place, row["unit"]
+            key = signals_of(row["channel"], mechanism)[0].place, row["unit"]
             largest[key] = max(largest.get(key, row), row, key=lambda row: float(row["estimate"]))
     return [row["channel"] for row in largest.values()]
 
 
-def leading(rows: Rows) -> list[str]:
-    """Channel with the largest equivalent load for force and torque of the cross bushings and of the fork bushings.
+def leading(rows: Rows, mechanism: Mechanism) -> list[str]:
+    """Channel with the largest equivalent load for force and torque of each group of bushings.
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    names, chosen = most_loaded(rows), []
+    names, chosen = most_loaded(rows, mechanism), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
-    for group, kind in loads.PANELS:
-        of_group = [row for row in candidates if row["unit"] == kind.unit]
-        of_group = [r for r in of_group if load_kinds.PLACES[signals_of(r["channel"])[0].place].group == group]
+    place_of = {name: places(mechanism)[signals_of(name, mechanism)[0].place] for name in names}
+    for group, kind in loads.panels(mechanism):
+        of_group = [row for row in candidates if row["unit"] == kind.unit and place_of[row["channel"]].group == group]
         chosen += [max(of_group, key=lambda row: float(row["estimate"]))["channel"]] if of_group else []
     return chosen
 
@@ -225,13 +227,13 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     parts = [(loading.cycles, view.rows(np.arange(view.n)))]
     if nominal:
         parts.insert(0, (loading.nominal, view.store.row(view.nominal_slots)))
-    frames = [_frame(part.worst(_middle(loading)), rows) for part, rows in parts]
+    frames = [_frame(part.worst(_middle(loading)), rows, view.mechanism) for part, rows in parts]
     return pd.concat(frames, ignore_index=True)
 
 
-def _frame(part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> pd.DataFrame:
+def _frame(part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]], mechanism: Mechanism) -> pd.DataFrame:
     joint, channel, cycle = np.nonzero((part.ranges > 0) & (part.repeats > 0))  # leaves out NaN
-    units = [unit_of(name) for name in part.channels]
+    units = [unit_of(name, mechanism) for name in part.channels]
     return pd.DataFrame(
         {
             "joint": rows[joint],

@@ -11,9 +11,10 @@ from tolstat.analysis import prediction, strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
 from tolstat.common import bisection
-from tolstat.common.channels import BUSHING_LOADS, Signal
+from tolstat.common.channels import BUSHING_LOADS, Signal, load_histories
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
 from tolstat.questions.fatigue import counting
@@ -56,13 +57,14 @@ def load_stresses(view: View, samples: int | None = None) -> Counted:
         remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
         raise InputError([Fault(str(view.path), "its study names no point of a part", remedy)])
     every = 1 + max(int(part.store.options["steps_per_rev"]) for part in view.parts) // 2
-    return counting.count(view, joints, stresses_at(points), joints.valid, every)
+    return counting.count(view, joints, stresses_at(points, view.mechanism), joints.valid, every)
 
 
-def stresses_at(points: Sequence[StressPoint]) -> list[Signal]:
+def stresses_at(points: Sequence[StressPoint], mechanism: Mechanism) -> list[Signal]:
     """Stress at each place of each point, Pa."""
+    history = load_histories(mechanism)[BUSHING_LOADS]
     places = [(point, factors) for point in points for factors in point.per_load]
-    return [Signal(point.name, "Pa", BUSHING_LOADS, point.bushing, factors) for point, factors in places]
+    return [Signal(point.name, "Pa", history, point.bushing, factors) for point, factors in places]
 
 
 class Evaluated(NamedTuple):

@@ -321,7 +321,7 @@ def meanings(entries: Sequence[Toleranced]) -> pd.DataFrame:
             for meaning in model.meaning(site):
                 sigma = float(f"{meaning.sigma:.6g}")
                 key = (entry.pattern, meaning.number, meaning.unit, sigma, f"{meaning.outside:.6g}")
-                rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in meaning.errors))
+                rows.setdefault(key, {}).update(dict.fromkeys(name.rpartition(".")[2] for name in meaning.errors))
     columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
     table = pd.DataFrame(cells, columns=columns)

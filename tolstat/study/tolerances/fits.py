@@ -15,11 +15,11 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather, input_error
-from tolstat.common.load_kinds import PINS
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict
-from tolstat.common.tables import HOLES
 from tolstat.display.text import percent
 from tolstat.study import selection
+from tolstat.study.axes import alike
 from tolstat.study.selection import Entry, Reading
 from tolstat.study.tolerances import iso, kinds
 from tolstat.study.tolerances.distributions import Distribution
@@ -28,9 +28,6 @@ from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
 KEY = "fit"
 PATH = ("tolerances", KEY)
 """Key of ``[tolerances]``, and its path."""
-HOLE, PIN = "hole*.diameter", "pin*.diameter"
-"""Errors that a fit gives tolerances to."""
-PAIRS = len(PINS)
 STAND_IN = {"basic": "20 mm", "code": "H7/f7", "distribution": "normal"}
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
@@ -95,6 +92,12 @@ class FitEntry(Strict):
         return {"plus_minus": _written(zone.half)} | self.model_dump(exclude={"basic", "code"}, exclude_none=True)
 
 
+def patterns(mechanism: Mechanism) -> tuple[str, str]:
+    """Errors that a fit gives tolerances to: diameters of the holes, and of the pins."""
+    pair = mechanism.pairs[0]
+    return f"{alike(pair.hole)}.diameter", f"{alike(pair.pin)}.diameter"
+
+
 class Fit(NamedTuple):
     """A fit that goes together.
 
@@ -104,10 +107,13 @@ class Fit(NamedTuple):
         As written.
     misfit : float
         Probability that a pin is larger than its hole; above zero for a distribution that reaches beyond its zone.
+    pairs : int
+        Number of pins.
     """
 
     entry: FitEntry
     misfit: float
+    pairs: int
 
     @property
     def diameters(self) -> dict[str, str]:
@@ -127,7 +133,7 @@ class Fit(NamedTuple):
             f"radial clearance {zones.least / 2:g} to {zones.largest / 2:g} um",
         ]
         if self.misfit > NEGLIGIBLE:
-            lines.append(f"fit: {percent(any_pair(self.misfit))} of the joints do not go together")
+            lines.append(f"fit: {percent(any_pair(self.misfit, self.pairs))} of the joints do not go together")
         return lines
 
 
@@ -142,15 +148,15 @@ def read(file: Reading) -> Fit | None:
         return None
     data = table[KEY]
     with gather(file.faults):
-        return of(data, file.place)
+        return of(data, file.place, file.mechanism)
     sizes = [data.get("basic"), STAND_IN["basic"]] if isinstance(data, Mapping) else [STAND_IN["basic"]]
     for basic in sizes:
         with suppress(InputError):
-            return of(STAND_IN | {"basic": basic}, "")
+            return of(STAND_IN | {"basic": basic}, "", file.mechanism)
     return None
 
 
-def of(data: object, place: str) -> Fit:
+def of(data: object, place: str, mechanism: Mechanism) -> Fit:
     """Read a fit.
 
     Parameters
@@ -159,6 +165,8 @@ def of(data: object, place: str) -> Fit:
         Value of the key ``fit``.
     place : str
         File name shown in faults.
+    mechanism : Mechanism
+        Whose pins and holes have the fit.
 
     Raises
     ------
@@ -172,20 +180,21 @@ def of(data: object, place: str) -> Fit:
     entry = strict.validate(FitEntry, data, place, prefix=PATH)
     zones = entry.zones
     deviations = []
-    for feature, zone in zip((HOLES[0], PINS[0]), zones, strict=True):
-        site = Site(f"{feature}.diameter", "m", 0.0, Path())
+    for name, zone in zip(patterns(mechanism), zones, strict=True):
+        site = Site(name, "m", 0.0, Path())
         deviations.append(kinds.entry(entry.scatter(zone), site, place, PATH).quantities(site)[site.name])
     hole, pin = deviations
     share = larger(pin, hole, 1e-6 * (zones.hole.middle - zones.shaft.middle))
     if zones.kind != "clearance":
-        raise InputError([_refusal(entry, zones, share, f"{where}.code")])
-    return Fit(entry, share)
+        raise InputError([_refusal(Fit(entry, share, len(mechanism.pairs)), zones, f"{where}.code")])
+    return Fit(entry, share, len(mechanism.pairs))
 
 
-def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fault:
+def _refusal(fit: Fit, zones: iso.Zones, where: str) -> Fault:
     kind = f"{'an' if zones.kind == 'interference' else 'a'} {zones.kind} fit"
-    found = f"{entry.code} is {kind}, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
-    found += f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
+    found = f"{fit.entry.code} is {kind}, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
+    joints = percent(any_pair(fit.misfit, fit.pairs))
+    found += f"{joints} of the joints do not go together ({percent(fit.misfit)} of the pairs)"
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
 
 
@@ -193,12 +202,12 @@ def _signed(value: float) -> str:
     return f"{value:+g}" if value else "0"
 
 
-def any_pair(share: float) -> float:
-    """Share of joints of which at least one pair does not go together, if the diameters are independent."""
-    return -math.expm1(PAIRS * math.log1p(-share)) if share < 1.0 else 1.0
+def any_pair(share: float, pairs: int) -> float:
+    """Share of joints of which at least one of `pairs` does not go together, if the diameters are independent."""
+    return -math.expm1(pairs * math.log1p(-share)) if share < 1.0 else 1.0
 
 
-def entries(table: Mapping[str, Any], fit: Fit | None) -> Iterator[Entry]:
+def entries(table: Mapping[str, Any], fit: Fit | None, mechanism: Mechanism) -> Iterator[Entry]:
     """Entries of ``[tolerances]``, with those of the holes' and of the pins' diameters in place of the fit.
 
     Parameters
@@ -207,12 +216,14 @@ def entries(table: Mapping[str, Any], fit: Fit | None) -> Iterator[Entry]:
         ``[tolerances]`` as parsed from TOML.
     fit : Fit or None
         The fit that `read` found in it; without one, the key is left out.
+    mechanism : Mechanism
+        Whose errors they are of.
     """
     for key, value in table.items():
         if key != KEY:
-            yield from selection.entries({key: value}, "tolerances")
+            yield from selection.entries({key: value}, mechanism, "tolerances")
         elif fit is not None:
-            for pattern, zone in zip((HOLE, PIN), fit.entry.zones, strict=True):
+            for pattern, zone in zip(patterns(mechanism), fit.entry.zones, strict=True):
                 yield Entry(pattern, PATH, fit.entry.scatter(zone))
 
 

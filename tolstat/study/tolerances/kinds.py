@@ -18,7 +18,7 @@ from tolstat.common.errors import gather, input_error
 from tolstat.common.strict import refuse
 from tolstat.common.tables import FACTORS
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus
-from tolstat.study.selection import TOLERANCED, Entry, Reading
+from tolstat.study.selection import Entry, Reading, toleranced_units
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.correlation import Lot
 from tolstat.study.tolerances.distributions import Distribution
@@ -221,7 +221,7 @@ ZONE_EXAMPLE = 'write { zone = "⌀0.1 mm", over = "22 mm", distribution = "norm
 
 def kinds_of(name: str) -> dict[str, type[ToleranceEntry]]:
     """Entries that an error or a zone can have, by the word for ``distribution``."""
-    return ZONE_KINDS.get(name.partition(".")[2], KINDS)
+    return ZONE_KINDS.get(name.rpartition(".")[2], KINDS)
 
 
 def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> ToleranceEntry:
@@ -321,7 +321,7 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     Tolerances
         Entries without fault.
     """
-    every = {name for _, names in table for name in names}
+    every, units = {name for _, names in table for name in names}, toleranced_units(file.mechanism)
     shared = {name for name in every if _partners(name) & every}
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
@@ -332,13 +332,13 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
         models = []
         with gather(file.faults):
             for name in names:
-                site = Site(name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
+                site = Site(name, units[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
                 if _is_position([name]):
                     direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
                     site = site._replace(direction=direction, diameter=diameters.get(name))
                 model = entry(item.value, site, file.place, item.path)
                 models.append((site, model))
-                feature, _, key = name.partition(".")
+                feature, _, key = name.rpartition(".")
                 if key == "diameter" and isinstance(model, SingleEntry):
                     diameters[f"{feature}.position"] = Diameter(model.band(site), model.build(site))
                 if key in ORIENTATIONS:
@@ -361,7 +361,7 @@ def _is_position(names: list[str]) -> bool:
 
 def _partners(name: str) -> set[str]:
     """Names of the zones that share position and direction of an axis with this one."""
-    feature, _, key = name.partition(".")
+    feature, _, key = name.rpartition(".")
     if key == "position":
         return {f"{feature}.{other}" for other in ORIENTATIONS}
     return {f"{feature}.position"} if key in ORIENTATIONS else set()

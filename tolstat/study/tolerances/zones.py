@@ -20,7 +20,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.notation import schema_of_quantity
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
-from tolstat.study.axes import ORIENTATIONS, PAIRS, REJECT, Axis, Bonus
+from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, alike, is_pair, is_pin, members, own
 from tolstat.study.tolerances.distributions import Distribution, Normal, TruncatedNormal, Uniform, sigma_of
 from tolstat.study.tolerances.entry import (
     Meaning,
@@ -153,9 +153,8 @@ class PositionEntry(ZoneEntry):
         rule = self.material_condition or (REJECT if self.zone.grows else None)
         if rule is None:
             return None
-        feature = site.name.partition(".")[0]
-        kind = feature.rstrip("1234")
-        if feature in PAIRS:
+        feature = site.name.rpartition(".")[0]
+        if is_pair(feature):
             remedy = 'give the positions of single features a bonus, "pin*.position"'
             raise refuse("the common axis of a pair has no diameter, and no bonus", remedy)
         if site.shared:
@@ -163,11 +162,11 @@ class PositionEntry(ZoneEntry):
         if self.truncate is not None:
             raise refuse("truncate has no effect beside a bonus: no part is outside the grown zone", "remove it")
         if site.diameter is None or site.diameter.band is None:
-            remedy = f'add fit, or "{kind}*.diameter" with plus_minus, or lower and upper'
+            remedy = f'add fit, or "{alike(feature)}.diameter" with plus_minus, or lower and upper'
             raise refuse(f"the bonus needs the limits of {feature}.diameter", remedy)
         lower, upper = site.diameter.band
         sigma = math.inf if self.distribution == "uniform" else sigma_of(-self.band, self.band, 0.0, self.cp or 1.0)
-        return Bonus(rule, f"{feature}.diameter", upper if kind == "pin" else lower, self.band, sigma)
+        return Bonus(rule, f"{feature}.diameter", upper if is_pin(f"{feature}.diameter") else lower, self.band, sigma)
 
     @property
     def band(self) -> float:
@@ -177,13 +176,13 @@ class PositionEntry(ZoneEntry):
     def names(self, site: Site) -> tuple[str, ...]:
         """See `ZoneEntry.names`."""
         _round(self)
-        feature = site.name.partition(".")[0]
+        feature = site.name.rpartition(".")[0]
         return (site.name,) if site.shared else tuple(f"{feature}.{end}" for end in axes.ends(feature))
 
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
         end, share = self._deviation(), self._outside()
-        feature, number = site.name.partition(".")[0], self.number()
+        feature, number = site.name.rpartition(".")[0], self.number()
         if (bonus := self.bonus(site)) is not None and site.diameter is not None:
             parts = Accepted(site.diameter.distribution, bonus)
             end = math.sqrt(0.5 * parts.expect(bonus.mean_square))
@@ -194,7 +193,7 @@ class PositionEntry(ZoneEntry):
         else:
             middle, slope = end / math.sqrt(2.0), math.sqrt(2.0) * end / self.over
             share = 1.0 - (1.0 - share) ** 2
-        offset = math.hypot(middle, site.reach * slope) if feature in PAIRS else middle
+        offset = math.hypot(middle, site.reach * slope) if is_pair(feature) else middle
         meanings = [Meaning(number, _columns(feature, "offset"), "m", offset, share)]
         return meanings if site.shared else [*meanings, Meaning(number, _columns(feature, "tilt"), "rad", slope, share)]
 
@@ -224,9 +223,9 @@ class OrientationEntry(ZoneEntry):
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
         slope, share = self._deviation(), self._outside()
-        feature = site.name.partition(".")[0]
+        feature = site.name.rpartition(".")[0]
         meanings = [Meaning(self.number(), _columns(feature, "tilt", self.about or "tz"), "rad", slope, share)]
-        if feature in PAIRS and not site.shared:
+        if is_pair(feature) and not site.shared:
             moved = {"t": "z", "z": "t"}[self.about] if self.about else "tz"
             offset = Meaning(self.number(), _columns(feature, "offset", moved), "m", site.reach * slope, share)
             return [offset, *meanings]
@@ -239,16 +238,16 @@ class CoaxialityEntry(ZoneEntry):
     def names(self, site: Site) -> tuple[str, ...]:
         """See `ZoneEntry.names`."""
         _round(self)
-        return tuple(f"{site.name}_{feature}" for feature in PAIRS[site.name.partition(".")[0]])
+        return tuple(f"{site.name}_{own(feature)}" for feature in members(site.name.rpartition(".")[0]))
 
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
         slope, share = self._deviation(), self._outside()
-        return [Meaning(self.number(), _columns(site.name.partition(".")[0], "tilt"), "rad", slope, share)]
+        return [Meaning(self.number(), _columns(site.name.rpartition(".")[0], "tilt"), "rad", slope, share)]
 
 
 def _columns(feature: str, kind: str, parts: str = "tz") -> tuple[str, ...]:
-    return tuple(f"{member}.{kind}_{part}" for member in PAIRS.get(feature, (feature,)) for part in parts)
+    return tuple(f"{member}.{kind}_{part}" for member in members(feature) for part in parts)
 
 
 def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str, Axis]:
@@ -273,7 +272,7 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
     for entry in entries:
         for site, model in entry.models:
             if axes.is_zone(site.name):
-                feature, _, key = site.name.partition(".")
+                feature, _, key = site.name.rpartition(".")
                 zones.setdefault(feature, {})[key] = (model, dotted(("tolerances", entry.pattern)))
                 if isinstance(model, PositionEntry):
                     bonus[feature] = model.bonus(site)
@@ -288,7 +287,7 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                     model, where = of_axis[key]
                     room = position.band if position.bounded else math.inf
                     faults += _contradictions(model, position, f"{place}: {where}")
-        axis_of[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
+        axis_of[name] = Axis(name, over, room, reach if is_pair(name) else math.nan, bonus.get(name))
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     return axis_of
@@ -311,7 +310,7 @@ def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[s
     """
     for entry in entries:
         for site, model in entry.models:
-            if not isinstance(model, PositionEntry | OrientationEntry) or site.name.partition(".")[0] not in PAIRS:
+            if not isinstance(model, PositionEntry | OrientationEntry) or not is_pair(site.name.rpartition(".")[0]):
                 continue
             apart = 2.0 * site.reach
             if model.over < apart * (1.0 - 1e-9):

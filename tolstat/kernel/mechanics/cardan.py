@@ -78,7 +78,7 @@ def write_joints(theta, par, work):
 def input_of(joint, theta, slope, par):
     """Cosine and sine of the input angle of a joint, from the plane of the joint, and its slope by the phase.
 
-    `theta`, `slope`: those of the first joint.
+    `theta` (rad), `slope`: angle of the first joint's input and its derivative by the phase.
     """
     sine, cosine = sine_cosine(theta)
     for before in range(joint):
@@ -106,7 +106,7 @@ def ideal_ratio(theta, par):
 
 @njit
 def travel(joint, theta, slope, par):
-    """Speed of each two pins in their holes, by the ideal motion; arguments as of `input_of`.
+    """Speed of each two pins in their holes, by the ideal motion; `theta`, `slope` as of `input_of`.
 
     Of pins that are no part of a Cardan joint, the speed of the input.
 

@@ -80,7 +80,7 @@ def rigid_guess(t, at_rest, par, work, q):
 
 @njit
 def place_joint(joint, at_rest, par, work, q):
-    """Write the unknowns of a joint to `q`, in which those of the joints before it stand."""
+    """Write the unknowns of a joint to `q`, in which those of the joints before it stand; `at_rest`: zeros, (n,)."""
     first, shafts, output = 4 * joint, 6 * par.lump_kind.shape[0], 2 * joint + 1
     shift_along = 0.0
     locate_all(q, at_rest, par, work)

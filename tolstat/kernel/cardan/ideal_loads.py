@@ -17,7 +17,7 @@ import math
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
-from tolstat.kernel.mechanics.cardan.motion import CROSS, OUTPUT
+from tolstat.kernel.mechanics.cardan import CROSS, OUTPUT
 from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
 from tolstat.kernel.mechanics.triad import from_triad, to_triad

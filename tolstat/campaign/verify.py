@@ -20,22 +20,13 @@ from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.what_if import check_code
+from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.loads import Limit, load_of, split
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import (
-    Fidelity,
-    Method,
-    Options,
-    Simulation,
-    Start,
-    Status,
-    tables,
-    to_names,
-    without_results,
-)
+from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.solver.reference import reference_rows
@@ -135,7 +126,7 @@ def run_checks(
                 results = _references(params, changed, mechanism, workers, progress)
             else:
                 results = simulate_each(params, changed, mechanism, simulate)
-            checks[name] = Check(CHECKS[name][0], to_names(changed[0]), results)
+            checks[name] = Check(CHECKS[name][0], tables.to_names(changed[0]), results)
     return checks
 
 
@@ -145,7 +136,7 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     done = pool.map_blocks(Work(partial(_reference, mechanism)), joints, min(workers, len(joints)))
-    results, counts = without_results(len(joints), Status.CRASHED, mechanism), Counts(len(joints))
+    results, counts = tables.without_results(len(joints), Status.CRASHED, mechanism), Counts(len(joints))
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:
@@ -165,7 +156,7 @@ def simulate_each(
     params: NDArray[np.void], options: Sequence[Options], mechanism: Mechanism, simulate: Simulate = simulate_beside
 ) -> NDArray[np.void]:
     """Results of joints, (m,) table RESULT, each with its own options, without histories."""
-    results = np.empty(len(params), tables(mechanism).RESULT)
+    results = np.empty(len(params), tables.tables(mechanism).RESULT)
     for distinct in dict.fromkeys(options):
         here = np.array([each == distinct for each in options])
         results[here] = simulate(params[here], distinct, mechanism=mechanism).results

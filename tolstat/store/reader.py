@@ -18,15 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.cardan import MECHANISMS
-from tolstat.common.columns import (
-    DESIGN_COLUMNS,
-    SUBSET,
-    Column,
-    drawn_columns,
-    error_columns,
-    kept_columns,
-    optional_columns,
-)
+from tolstat.common.columns import DESIGN_COLUMNS, SUBSET, Column, drawn_columns, error_columns, kept_columns
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import DESIGN, Status, tables
@@ -379,7 +371,7 @@ class Reader:
         whole = tuple(fields) == dtype.names
         table = np.zeros(max(0, last - first), dtype if whole else [(name, dtype[name]) for name in fields])
         if group == "results":
-            for name in set(fields) & {c.field for c in optional_columns(self.mechanism)}:
+            for name in (name for name in fields if dtype[name].base.kind == "f"):
                 table[name] = np.nan
         for c in columns:
             if c.field in fields:

@@ -22,7 +22,8 @@ from tests.support import fakes, synthetic
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
-from tolstat.common.tables import RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import RESULT, Options, Simulation, Status
 from tolstat.store import ResultFile
 
 

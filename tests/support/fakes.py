@@ -24,18 +24,8 @@ from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common.columns import KEPT, Column, kept_columns
 from tolstat.common.counts import Counts
-from tolstat.common.tables import (
-    DESIGN,
-    ERROR,
-    ERROR_FIELDS,
-    PARAM,
-    RESULT,
-    RESULT_FIELDS,
-    HistorySpec,
-    Options,
-    Simulation,
-    Status,
-)
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, RESULT_FIELDS, Options, Simulation, Status
 from tolstat.joint import Operation
 from tolstat.joint.model import leaves
 from tolstat.solver import stationary

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.pool import Lost, Work
+from tolstat.common.fields import HistorySpec
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import PARAM, VALID, HistorySpec, Options, Simulation, Status, without_results
+from tolstat.common.tables import PARAM, VALID, Options, Simulation, Status, without_results
 
 
 class Block(NamedTuple):

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, MEASURING, SHAFT_LOADS, LoadHistory
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, kept_columns
+from tolstat.common.fields import HistorySpec
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
-from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
+from tolstat.common.tables import SCHEMA_VERSION, Mode, Status
 from tolstat.store import metadata as documents
 from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_scale, store_error
 from tolstat.store.metadata import Metadata

@@ -23,7 +23,8 @@ from tests.support.of_cardan import RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
-from tolstat.common.tables import HistorySpec, Options, Simulation, Status
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile
 
 

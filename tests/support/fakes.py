@@ -25,7 +25,8 @@ from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common.columns import KEPT, Column
 from tolstat.common.counts import Counts
-from tolstat.common.tables import DESIGN, HistorySpec, Options, Simulation, Status
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import DESIGN, Options, Simulation, Status
 from tolstat.joint import Operation
 from tolstat.joint.model import leaves
 from tolstat.solver import stationary

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.pool import Lost, Work
+from tolstat.common.fields import HistorySpec
 from tolstat.common.loads import load_of
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import VALID, HistorySpec, Options, Simulation, Status, tables, without_results
+from tolstat.common.tables import VALID, Options, Simulation, Status, tables, without_results
 
 
 class Block(NamedTuple):

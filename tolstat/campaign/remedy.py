@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from tolstat.common import strict, tables
 from tolstat.common.errors import Fault, gather, input_error, raise_all
-from tolstat.common.tables import FAILED, UNSETTLED, HistorySpec, Options, Status
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS

@@ -1,11 +1,12 @@
-"""What the tables are made of; parameters of one joint for the kernel, which the table PARAM holds."""
+"""What the tables and histories of a campaign are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Field(NamedTuple):
@@ -38,3 +39,21 @@ class Field(NamedTuple):
 def dtype_of(fields: Iterable[Field]) -> np.dtype[np.void]:
     """Aligned structured dtype of a table."""
     return np.dtype([(f.name, f.dtype, f.shape) for f in fields], align=True)
+
+
+class HistorySpec(NamedTuple):
+    """What a load history holds for each joint: an array of `shape`, without the leading axis of joints.
+
+    `axes` are the names of its axes.
+    """
+
+    shape: tuple[int, ...]
+    dtype: str
+    unit: str
+    description: str
+    axes: tuple[str, ...] = ()
+
+    def blank(self, n: int) -> NDArray[Any]:
+        """Return a placeholder for `n` joints without history, (n, ...): NaN (0 for integers) throughout."""
+        dtype = np.dtype(self.dtype)
+        return np.full((n, *self.shape), np.nan if dtype.kind == "f" else 0, dtype)

@@ -180,24 +180,6 @@ def follows_error(options: Options) -> bool:
     return options.method == Method.TR_BDF2 and options.rtol > 0 and options.fidelity == Fidelity.DYNAMIC
 
 
-class HistorySpec(NamedTuple):
-    """What a load history holds for each joint: an array of `shape`, without the leading axis of joints.
-
-    `axes` are the names of its axes.
-    """
-
-    shape: tuple[int, ...]
-    dtype: str
-    unit: str
-    description: str
-    axes: tuple[str, ...] = ()
-
-    def blank(self, n: int) -> NDArray[Any]:
-        """Return a placeholder for `n` joints without history, (n, ...): NaN (0 for integers) throughout."""
-        dtype = np.dtype(self.dtype)
-        return np.full((n, *self.shape), np.nan if dtype.kind == "f" else 0, dtype)
-
-
 class Variant(NamedTuple):
     """One of the joints that the cases are run with.
 

@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, Signal, components, load_histories
+from tolstat.common.fields import HistorySpec
 from tolstat.common.load_kinds import CONTACTS, spans
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import HistorySpec, Options
+from tolstat.common.tables import Options
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 KEPT = 16

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from tolstat.common.cardan import MECHANISMS
 from tolstat.common.channels import LoadHistory, components, followed, load_histories
 from tolstat.common.columns import DESIGN_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, error_columns, kept_columns
+from tolstat.common.fields import HistorySpec
 from tolstat.common.load_kinds import CONTACTS, kinds
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
+from tolstat.common.tables import SCHEMA_VERSION, Mode, Status
 from tolstat.store import metadata as documents
 from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_scale, store_error
 from tolstat.store.metadata import Metadata

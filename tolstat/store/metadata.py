@@ -20,7 +20,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 import tolstat
-from tolstat.common.tables import HistorySpec, Options, Variant, to_names
+from tolstat.common.fields import HistorySpec
+from tolstat.common.tables import Options, Variant, to_names
 from tolstat.store.hdf5 import put_attributes, text
 from tolstat.study import Study
 

@@ -19,8 +19,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.fields import HistorySpec
 from tolstat.common.files import atomic_write, check_disk_space, make_parent, reason
-from tolstat.common.tables import HistorySpec, Options, Simulation, Status
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import checksums, layout, metadata
 from tolstat.store.checksums import ROWS, blocks_of
 from tolstat.store.hdf5 import copy_open, is_at, put, replace, store_error

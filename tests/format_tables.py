@@ -61,7 +61,7 @@ def session_table() -> str:
 def axis_table() -> str:
     """Markdown table of the axes of histories."""
     lines = ["| axis | values | unit | meaning |", "|---|---|---|---|"]
-    for name, (values, text) in layout.AXES.items():
+    for name, (values, text) in layout.axes_of(CARDAN).items():
         held = [f"`{value}`" for value in values]
         told = held if len(held) <= 8 else [*held[:2], "...", held[-1]]
         lines.append(f"| `{name}` | {', '.join(told)} | 1 | {text} |")

@@ -6,6 +6,7 @@ import os
 import signal
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tolstat.store import ResultFile
 
 
 def simulate_deadly(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, folder: Path, deadly: float, alone: int
+    params: np.ndarray, options: Options, folder: Path, deadly: float, alone: int, **kept: Any
 ) -> Simulation:
     """Simulate; one joint kills its process in a block with others, and `alone` times when it is alone."""
     if deadly in params["R"]:
@@ -24,7 +25,7 @@ def simulate_deadly(
         (folder / f"{'alone' if len(params) == 1 else 'among'}_{os.getpid()}_{number}").touch()
         if len(params) > 1 or number < alone:
             os.kill(os.getpid(), signal.SIGKILL)
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 @pytest.mark.slow

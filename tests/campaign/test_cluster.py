@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -103,12 +103,10 @@ def test_the_first_blocks_that_fail_are_no_fault_of_the_cluster(tmp_path: Path) 
         assert np.flatnonzero(store.status() == Status.CRASHED).tolist() == bad
 
 
-def simulate_or_raise(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, bad: np.ndarray
-) -> Simulation:
+def simulate_or_raise(params: np.ndarray, options: Options, bad: np.ndarray, **kept: Any) -> Simulation:
     if np.isin(params["R"], bad).any():
         raise ZeroDivisionError("a bug of this joint")
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -32,11 +33,11 @@ BODY = synthetic.STUDY.replace("[output]", '[output]\nhistories = "KIND"')
 Make = Callable[..., Study]
 
 
-def simulate(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+def simulate(params: np.ndarray, options: Options, **kept: Any) -> Simulation:
     """Stand-in for the solver: numbers that depend on the joint's own errors."""
     params = params.copy()
     params["R"] = params["pin_point"].sum(axis=(1, 2)) * 1e4
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 STAND_IN = fakes.SOLVER | {"history_specs": fakes.history_specs, "simulate_rows": simulate}

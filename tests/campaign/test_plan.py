@@ -18,6 +18,7 @@ from tolstat import cli, study
 from tolstat.analysis import binomial
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Status
 from tolstat.store import ResultFile
@@ -28,13 +29,13 @@ RULE = "P(cross1.F > 0.5 N) width < 0.4"
 
 def test_a_rule_is_read() -> None:
     single = Limit("cross1.F", ("cross1.F",), (700.0,))
-    assert stop_rule.parse("P(cross1.F > 0.7 kN) width < 0.002", {})[1:] == (single, 0.002)
-    assert stop_rule.parse(" P( psi>1e-3 )width<0.5 ", {})[1:] == (Limit("psi", ("psi",), (1e-3,)), 0.5)
-    several = stop_rule.parse("P(*.F > 700 N) width < 0.01", {}).limit
+    assert stop_rule.parse("P(cross1.F > 0.7 kN) width < 0.002", {}, CARDAN)[1:] == (single, 0.002)
+    assert stop_rule.parse(" P( psi>1e-3 )width<0.5 ", {}, CARDAN)[1:] == (Limit("psi", ("psi",), (1e-3,)), 0.5)
+    several = stop_rule.parse("P(*.F > 700 N) width < 0.01", {}, CARDAN).limit
     assert several.loads == tuple(name for name in LOADS if name.endswith(".F"))
     assert (several.level, several.unit, str(several)) == (700.0, "N", "*.F > 700 N")
     limits = {"cross1.F": 700.0, "psi": 0.01}
-    every = stop_rule.parse("P(any limit) width < 0.01", limits).limit
+    every = stop_rule.parse("P(any limit) width < 0.01", limits, CARDAN).limit
     assert (every.loads, every.levels, every.level, str(every)) == (
         *zip(*limits.items(), strict=True),
         1.0,
@@ -45,7 +46,7 @@ def test_a_rule_is_read() -> None:
 def test_a_joint_is_above_a_limit_of_several_loads_if_one_of_them_is() -> None:
     results = synthetic.results(50)
     for text, level in (("P(cross*.F > 700 N) width < 0.1", 700.0), ("P(any limit) width < 0.1", 1.0)):
-        limit = stop_rule.parse(text, {"cross1.F": 700.0, "fork3.T": 30.0}).limit
+        limit = stop_rule.parse(text, {"cross1.F": 700.0, "fork3.T": 30.0}, CARDAN).limit
         each = [LOADS[name].of(results) > own for name, own in zip(limit.loads, limit.levels, strict=True)]
         assert ((limit.of(results) > level) == np.any(each, axis=0)).all()
 
@@ -63,7 +64,7 @@ def test_a_joint_is_above_a_limit_of_several_loads_if_one_of_them_is() -> None:
 )
 def test_faults_of_a_rule_are_told_together(text: str, words: list[str]) -> None:
     with pytest.raises(InputError) as caught:
-        stop_rule.parse(text, {})
+        stop_rule.parse(text, {}, CARDAN)
     assert all(word in str(caught.value) for word in words), caught.value
 
 
@@ -73,7 +74,7 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
     def run(row: int) -> None:
         fakes.run(made, path, workers, block, until_row=row)
 
-    return stop_rule.run_until(made, path, stop_rule.parse(RULE, {}), run)
+    return stop_rule.run_until(made, path, stop_rule.parse(RULE, {}, CARDAN), run)
 
 
 @pytest.fixture
@@ -137,7 +138,7 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
     loaded = study.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"sampling\.method is 'sobol': .* independent samples"):
-        stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE, {}), lambda row: None)
+        stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE, {}, CARDAN), lambda row: None)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import time
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,12 +87,12 @@ def test_a_machine_on_which_workers_die_ends_the_run_and_keeps_what_is_done(
     }
 
 
-def simulate_until(params: np.ndarray, options: Options, histories: str, n_harmonics: int, folder: str) -> Simulation:
+def simulate_until(params: np.ndarray, options: Options, folder: str, **kept: Any) -> Simulation:
     """Simulate four blocks; then every process dies."""
     if len(list(Path(folder).iterdir())) == 4:
         os.kill(os.getpid(), signal.SIGKILL)
     Path(folder, str(params["R"][0])).touch()
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 @pytest.mark.slow
@@ -106,11 +107,11 @@ def test_a_joint_that_kills_in_the_check_of_a_run_does_not_end_it(tmp_path: Path
     assert status == {"half_step": [Status.CRASHED], "newton": [Status.OK], "settling": [Status.OK]}
 
 
-def simulate_checks_badly(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+def simulate_checks_badly(params: np.ndarray, options: Options, **kept: Any) -> Simulation:
     """Simulate; joints with finer steps kill their process."""
     if options.steps_per_rev > Options().steps_per_rev:
         os.kill(os.getpid(), signal.SIGKILL)
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 @pytest.mark.slow
@@ -124,13 +125,11 @@ def test_a_joint_that_kills_in_the_pilot_of_a_fidelity_is_no_joint_of_the_others
     assert [rung for rung, joints in differing.items() if joints] == [("quasistatic", 36), ("quasistatic", 60)]
 
 
-def simulate_pilot_badly(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float
-) -> Simulation:
+def simulate_pilot_badly(params: np.ndarray, options: Options, kills: float, **kept: Any) -> Simulation:
     """Simulate; one joint kills its process with few quasi-static steps."""
     if kills in params["R"] and options.fidelity == Fidelity.QUASISTATIC and options.steps_per_rev < 90:
         os.kill(os.getpid(), signal.SIGKILL)
-    return fakes.simulate(params, options, histories, n_harmonics)
+    return fakes.simulate(params, options, **kept)
 
 
 def test_parameters_that_are_no_numbers_are_not_simulated(tmp_path: Path, expected: dict[str, bytes]) -> None:
@@ -233,9 +232,9 @@ SETTINGS = {"solver.steps_per_rev": 60}
 AGAIN = Retry((Status.NEWTON_FAILED,), SETTINGS, Options(steps_per_rev=60))
 
 
-def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+def simulate_finely(params: np.ndarray, options: Options, **kept: Any) -> Simulation:
     """Simulate; with 60 steps nothing fails."""
-    found = fakes.simulate(params, options, histories, n_harmonics)
+    found = fakes.simulate(params, options, **kept)
     if options.steps_per_rev == 60:
         found.results["status"] = Status.OK
         found.results["F_max"] = 7.0

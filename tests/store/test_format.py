@@ -24,6 +24,7 @@ from tests.support import fakes
 from tests.support.of_cardan import ERROR_COLUMNS, RESULT_COLUMNS
 from tests.support.reading import read_all
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION, Mode, Status
 from tolstat.store import ResultFile, Writer, layout, metadata, verification, what_if
@@ -147,8 +148,8 @@ def test_axes_of_histories_have_names(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name, spec in specs.items():
             layout.attach_scales(file.create_dataset(name, (2, *spec.shape), spec.dtype), spec)
-        held = {name: file[name].asstr()[:].tolist() for name in layout.AXES}
-        assert held == {name: list(names) for name, (names, _) in layout.AXES.items()}
+        held = {name: file[name].asstr()[:].tolist() for name in layout.axes_of(CARDAN)}
+        assert held == {name: list(names) for name, (names, _) in layout.axes_of(CARDAN).items()}
         np.testing.assert_allclose(file["theta"][:], np.radians(np.arange(0, 360, 10)))
         assert file["harmonic"][:].tolist() == [0, 1, 2, 3, 4]
         assert all(len(dim) == 1 for name in specs for dim in list(file[name].dims)[1:])

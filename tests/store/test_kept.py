@@ -22,6 +22,7 @@ from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
 from tolstat.campaign.verify import QUICK_CHECKS
+from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import KEPT
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions import joints as question
@@ -275,6 +276,6 @@ def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
         for by in ("fork1.T", "fork1.T_max", "psi"):
             with pytest.raises(InputError, match=r"is not kept in .*\n.*give one of: cross1\.F, "):
                 joint_rows(store.view(), by)
-    until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1", {})
+    until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1", {}, CARDAN)
     with pytest.raises(InputError, match=r"leaves out pin1\.contact, .*--until.*\n.*add pin1\.contact_outer_max, pin1"):
         stop_rule.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

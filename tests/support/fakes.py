@@ -20,12 +20,14 @@ import numpy as np
 import pytest
 
 from tests.support.environment import environment as environment
-from tests.support.of_cardan import ERROR, ERROR_FIELDS, PARAM, RESULT, RESULT_FIELDS, kept_columns
+from tests.support.of_cardan import ERROR, ERROR_FIELDS, PARAM, RESULT, RESULT_FIELDS
 from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
-from tolstat.common.columns import KEPT, Column
+from tolstat.common.cardan import CARDAN
+from tolstat.common.columns import KEPT, Column, kept_columns
 from tolstat.common.counts import Counts
 from tolstat.common.fields import HistorySpec
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import DESIGN, Options, Simulation, Status
 from tolstat.joint import Operation
 from tolstat.joint.model import leaves
@@ -59,12 +61,11 @@ class Output:
     harmonics: int = 4
     results: tuple[str, ...] | None = None
 
-    @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self, mechanism: Mechanism) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return kept_columns(self.identity())
+        return kept_columns(self.identity(mechanism), mechanism)
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self, mechanism: Mechanism) -> dict[str, Any]:
         """Return what decides the numbers."""
         return {"output": self.histories} | ({} if self.results is None else {KEPT: list(self.results)})
 
@@ -93,6 +94,7 @@ class Study:
     limits: dict[str, float] = field(default_factory=lambda: {"cross1.F": 700.0})
     name: str = "fake"
     text: str = "# a study\n[sampling]\nn = 40  # Größe\n"
+    mechanism: Mechanism = CARDAN
     variants: tuple[()] = ()
     case_names: tuple[()] = ()
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
@@ -122,6 +124,11 @@ class Study:
     def sampling(self) -> Sampling:
         """Table ``[sampling]`` of a study."""
         return Sampling(n=self.samples, seed=self.seed)
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the results that are kept."""
+        return self.output.columns(self.mechanism)
 
     @property
     def first_sample(self) -> int:
@@ -163,7 +170,7 @@ class Study:
         operations = {point.name: point.operation.model_dump() for point in self.points}
         parts = {"joint": self.joint, "operation": operations.get("", operations)}
         settings = {"solver.steps_per_rev": self.solver.steps_per_rev} | leaves(parts)
-        return settings | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
+        return settings | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity(self.mechanism)
 
 
 def draw(study: Study) -> np.ndarray:
@@ -189,12 +196,19 @@ def parameters(store: Reader, slots: np.ndarray) -> np.ndarray:
     return perturb(None, store.operation, store.errors()[slots])
 
 
-def history_specs(options: Options, histories: str, n_harmonics: int) -> dict[str, HistorySpec]:
+def history_specs(
+    options: Options, histories: str, n_harmonics: int, mechanism: Mechanism = CARDAN
+) -> dict[str, HistorySpec]:
     return SPECS if histories == "full" else {}
 
 
 def simulate(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, seconds: float = 0.0
+    params: np.ndarray,
+    options: Options,
+    histories: str = "none",
+    n_harmonics: int = 0,
+    mechanism: Mechanism = CARDAN,
+    seconds: float = 0.0,
 ) -> Simulation:
     """Simulate joints by a formula, `seconds` each; one in ten fails, one in ten does not settle."""
     time.sleep(seconds * len(params))
@@ -220,35 +234,35 @@ def history(spec: HistorySpec, x: np.ndarray) -> np.ndarray:
     return (np.abs(values) * 50 % 4 if spec.dtype == "u1" else values).astype(spec.dtype)
 
 
-def simulate_and_raise(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+def simulate_and_raise(params: np.ndarray, options: Options, **kept: Any) -> Simulation:
     raise ZeroDivisionError("a bug")
 
 
 def simulate_badly(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float, raises: float = np.nan
+    params: np.ndarray, options: Options, kills: float, raises: float = np.nan, **kept: Any
 ) -> Simulation:
     """Simulate, but the joint with one value of R kills its process, and another one is a bug."""
     if kills in params["R"]:
         os.kill(os.getpid(), signal.SIGKILL)
     if raises in params["R"]:
         raise ZeroDivisionError("a bug of this joint")
-    return simulate(params, options, histories, n_harmonics)
+    return simulate(params, options, **kept)
 
 
-def warm_up(options: Options, params: np.ndarray | None = None) -> None:
+def warm_up(options: Options, params: np.ndarray | None = None, mechanism: Mechanism = CARDAN) -> None:
     """Compile nothing."""
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "draw_blocks": draw_blocks,
     "origin_blocks": lambda *_: None,
-    "dimensions": lambda: {"pin1.offset_e": 0},
+    "dimensions": lambda mechanism: {"pin1.offset_e": 0},
     "perturb": perturb,
     "parameters": parameters,
     "history_specs": history_specs,
     "simulate_rows": simulate,
     "warm_up": warm_up,
-    "is_compiled": lambda *_: False,
+    "is_compiled": lambda *_, **__: False,
 }
 """Functions that campaigns call, by the names under which they import them."""
 SOLVER = {name: FUNCTIONS[name] for name in ("simulate_rows", "warm_up", "is_compiled")} | {

@@ -12,7 +12,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.solver import stationary
 
 
-def stand_in(params, options, histories="none", n_harmonics=0):
+def stand_in(params, options, **given):
     """Loads at 100 N m from one tilt and one offset: 640 N, 40 N a sigma of the tilt, 15 N a sigma of the offset."""
     results = np.zeros(len(params), RESULT)
     tilt = -params["pin_axis"][:, 0, 2] / 0.0029  # about t of pin 1: its axis leaves along z

@@ -64,7 +64,7 @@ def test_how_the_simulation_went_is_always_kept() -> None:
 def test_patterns_select_columns(tmp_path: Path) -> None:
     made = loaded(tmp_path, text("psi_max", "cross[12].F_max", "status"))
     names = {*COURSE, "cross1.F_max", "cross2.F_max", "psi_max"}
-    assert [c.name for c in made.output.columns] == [c.name for c in RESULT_COLUMNS if c.name in names]
+    assert [c.name for c in made.columns] == [c.name for c in RESULT_COLUMNS if c.name in names]
     assert made.identity()[KEPT] == ["cross1.F_max", "cross2.F_max", "psi_max"]
     assert made.asked == ["cross1.F", "cross2.F", "psi"]
     only_course = loaded(tmp_path, text("status"))
@@ -198,7 +198,7 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(table, pd.DataFrame(question.error_rows(found, CARDAN)))
     assert set(table["load"]) == {"F"}
     assert table["worst"].max() > 0
-    assert {row["load"] for row in question.joint_rows(held)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
+    assert {row["load"] for row in question.joint_rows(held, CARDAN)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
     assert question.error_note(held, CARDAN).count("F ") == 1
     assert "T " not in question.error_note(held, CARDAN)
 

@@ -68,7 +68,7 @@ def test_patterns_select_columns(tmp_path: Path) -> None:
     assert made.identity()[KEPT] == ["cross1.F_max", "cross2.F_max", "psi_max"]
     assert made.asked == ["cross1.F", "cross2.F", "psi"]
     only_course = loaded(tmp_path, text("status"))
-    assert [c.name for c in only_course.output.columns] == COURSE
+    assert [c.name for c in only_course.columns] == COURSE
     assert only_course.asked == []
 
 

@@ -4,9 +4,10 @@ A record of one joint, of width 1, is read as plain numbers.
 """
 
 import numpy as np
+from numba import typeof
 from numba.core import types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, overload, overload_attribute, register_model
+from numba.extending import intrinsic, lower_getattr, overload, register_model
 
 from tolstat.common.cardan import CARDAN
 from tolstat.common.parameters import NUMBERS, numbers
@@ -22,12 +23,19 @@ class LaneRecord(types.Record):
     The numbers of the mechanism are `constants` of the code, which loops over its parts are unrolled with.
     """
 
-    constants = None
+    constants: dict[str, np.ndarray] = {}
 
     @property
     def dtype(self):
         """Equivalent NumPy type: bytes without structure."""
         return np.dtype((np.void, self.size))
+
+    def typeof(self, key):
+        """Numba type of a constant or a field."""
+        if key not in self.constants:
+            return super().typeof(key)
+        constant = typeof(self.constants[key])
+        return constant.copy(readonly=True) if isinstance(constant, types.Array) else types.intp
 
 
 @register_model(LaneRecord)
@@ -53,20 +61,16 @@ def record_of_lanes(record):
 
 
 def _constant(name):
-    """Implementation of an attribute of `LaneRecord`: one of its constants."""
+    """Code of an attribute of `LaneRecord` that is one of its constants."""
 
-    def get(record):
-        if not record.constants or name not in record.constants:
-            return None
-        value = record.constants[name]
-        value = value if value.ndim > 0 else int(value)
-        return lambda record: value
+    def lower(context, builder, record, value):
+        return context.get_constant_generic(builder, record.typeof(name), record.constants[name])
 
-    return get
+    return lower
 
 
 for _name in numbers(CARDAN):
-    overload_attribute(LaneRecord, _name)(_constant(_name))
+    lower_getattr(LaneRecord, _name)(_constant(_name))
 
 
 def as_lanes(memory):

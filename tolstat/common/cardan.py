@@ -4,9 +4,12 @@ The hub carries pins 1 to 4; pin 1 turns in the hole of arm 4, pin 2 in arm 3, p
 and 2 belong to the input fork, 3 and 4 to the output fork. `kernel.mechanics.cardan` counts on the order of the parts.
 """
 
+from functools import cache
+
 from tolstat.common.mechanism import (
     CLOSED_FORM,
     Bushing,
+    Face,
     Hinge,
     Lump,
     Mechanism,
@@ -76,5 +79,29 @@ def series(number: int) -> Mechanism:
 
 SERIES = series(2)
 """Two joints in series."""
-MECHANISMS = {mechanism.name: mechanism for mechanism in (CARDAN, SERIES)}
-"""Mechanisms by name."""
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings")
+"""What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
+its first and its last shaft."""
+
+
+@cache
+def extended(name: str) -> Mechanism:
+    """Return a mechanism by its name: ``cardan``, or with some of `PARTS`, in their order, ``cardan+thrust+friction``.
+
+    Raises
+    ------
+    KeyError
+        When there is none.
+    """
+    base, *parts = name.split("+")
+    mechanism = {one.name: one for one in (CARDAN, SERIES)}[base]
+    if parts != [part for part in PARTS if part in parts]:
+        raise KeyError(name)
+    pins = [pair.pin for pair in mechanism.pairs] if "thrust" in parts else []
+    ends = {mechanism.shafts[i].name for i, end in ((0, "input"), (-1, "output")) if f"{end}_bearings" in parts}
+    return mechanism._replace(
+        name=name,
+        shafts=tuple(shaft._replace(borne=shaft.name in ends) for shaft in mechanism.shafts),
+        faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
+        friction="friction" in parts,
+    )

@@ -39,6 +39,7 @@ def places(mechanism: Mechanism) -> dict[str, Place]:
     found = [
         *(Place(bushing.name, bushing.group) for bushing in mechanism.bushings),
         *(Place(pair.pin, "pin") for pair in mechanism.pairs),
+        *(Place(face.name, "thrust") for face in mechanism.faces),
         *(Place(shaft.name, "shaft") for shaft in mechanism.shafts),
         Place("", "joint"),
     ]
@@ -72,8 +73,9 @@ class Kind(NamedTuple):
     parts : tuple of str
         Values at each place, the largest of which is the load; empty if there is one.
     orders : tuple of int
-        Orders of the input speed whose amplitudes are loads of their own: ``psi_1x``. Amplitudes belong to a whole
-        revolution; kinds with orders come last in the registry.
+        Orders of the input speed whose amplitudes are loads of their own: ``psi_1x``.
+    of_revolution : bool
+        Whether it belongs to a whole revolution, as amplitudes do; such kinds come last in the registry.
     measure : Kind, optional
         Kind whose largest value errors and changes of the load are relative to; by default itself.
     decides : bool
@@ -98,6 +100,7 @@ class Kind(NamedTuple):
     places: tuple[str, ...] = JOINT
     parts: tuple[str, ...] = ()
     orders: tuple[int, ...] = ()
+    of_revolution: bool = False
     measure: Kind | None = None
     decides: bool = False
     shown: bool = False
@@ -158,15 +161,20 @@ _PSI = "|Psi|, relative error of the speed ratio, eq. (13)"
 _AXIAL = f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}"
 _LATERAL = f"force across the shaft {OVER}"
 _MOMENT = f"bending moment of the shaft about the joint's centre {OVER}"
+_THRUST = f"force of the thrust face {OVER}"
+_BEARING = f"radial load of the shaft's bearing {OVER}"
+_LOSS = "mean power that friction takes in a pin's bearing, or in all, of any revolution"
 _DRIVE = f"torque about the input shaft {OVER}"
 
 
 @cache
-def kinds(mechanism: Mechanism) -> dict[str, Kind]:
-    """Kinds of the loads of a mechanism by key, in the order of reports and of kernels."""
+def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """All kinds by key, in the order of reports and of kernels; those that a mechanism lacks have no places."""
     bushings = tuple(bushing.name for bushing in mechanism.bushings)
     pins, shafts = tuple(pair.pin for pair in mechanism.pairs), tuple(shaft.name for shaft in mechanism.shafts)
     driven = tuple(shaft.name for shaft in mechanism.shafts if shaft.driven)
+    borne = tuple(shaft.name for shaft in mechanism.shafts if shaft.borne)
+    faces = tuple(face.name for face in mechanism.faces)
     bushing: dict[str, Any] = {"decides": True, "shown": True, "averaged": True, "modulus": True}
     F = Kind("F", "F", "bushing force", "N", _FORCE, bushings, components=("F_e", "F_t", "F_z"), **bushing)
     T = Kind("T", "T", _ROOT, "N*m", _TORQUE, bushings, components=("T_e", "T_t", "T_z"), **bushing)
@@ -183,27 +191,47 @@ def kinds(mechanism: Mechanism) -> dict[str, Kind]:
         Kind("lateral", "lateral", "lateral force", meaning=_LATERAL, components=("f_x", "f_y"), **of_force, **across),
         Kind("moment", "moment", "bending moment", meaning=_MOMENT, components=("m_x", "m_y"), **of_moment, **across),
         Kind("drive", "drive", "driving torque", meaning=_DRIVE, places=driven, components=("m_z",), **of_moment),
+        Kind("thrust", "F", "thrust force", "N", _THRUST, faces, measure=F),
+        *(
+            Kind(f"bearing_{end}", f"bearing_{end}", "bearing load", "N", _BEARING, borne, measure=F, modulus=True)
+            for end in "ab"
+        ),
     ]
     of_orders = (
         ("lateral", "lateral force", "N", shafts, F),
         ("moment", "bending moment", "N*m", shafts, T),
         ("drive", "driving torque", "N*m", driven, T),
         ("psi", "speed error Psi", "1", JOINT, psi),
+        ("bearing_a", "bearing load", "N", borne, F),
+        ("bearing_b", "bearing load", "N", borne, F),
     )
     for symbol, noun, unit, where, measure in of_orders:
         meaning = (
             f"amplitude of the {noun} at multiples of the input speed, in axes that do not turn, of any revolution"
         )
         key, noun = f"{symbol}_orders", f"amplitude of the {noun}"
-        found.append(Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, measure=measure))
+        found.append(
+            Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, of_revolution=True, measure=measure)
+        )
+    found.append(Kind("loss", "loss", "loss", "W", _LOSS, (*pins, "") if mechanism.friction else (), of_revolution=True))
     return {kind.key: kind for kind in found}
+
+
+@cache
+def kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """Kinds of the loads that a mechanism has, as of `all_kinds`."""
+    return {key: kind for key, kind in all_kinds(mechanism).items() if kind.places}
 
 
 @cache
 def spans(mechanism: Mechanism) -> dict[str, slice]:
     """Elements of each kind in arrays with the values of all loads, kind after kind, by key."""
-    ends = [*accumulate((kind.size for kind in kinds(mechanism).values()), initial=0)]
+    ends = _ends(kinds(mechanism))
     return {key: slice(ends[i], ends[i + 1]) for i, key in enumerate(kinds(mechanism))}
+
+
+def _ends(of: dict[str, Kind]) -> list[int]:
+    return [*accumulate((kind.size if kind.places else 0 for kind in of.values()), initial=0)]
 
 
 @cache
@@ -213,7 +241,7 @@ def load_numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
     Returns
     -------
     dict of str to ndarray of int
-        ``begin``: (kinds,) first element of each kind. ``modulus``, ``interpolated``: (n,) of each load at one instant,
+        ``begin``: (kinds,) first element of each of `all_kinds`. ``modulus``, ``interpolated``: (n,) of each load at one instant,
         whether kernels write its square, and whether a largest value between samples is interpolated. ``measured``:
         (measures, 2) first and last + 1 of the loads that changes are relative to, forces and torques. ``deciding``:
         loads that decide on settling, closer look and steps; those compared with measure m are number
@@ -221,7 +249,7 @@ def load_numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
         instant that do not decide.
     """
     by_key, span = kinds(mechanism), spans(mechanism)
-    instant = [kind for kind in by_key.values() if not kind.orders]
+    instant = [kind for kind in by_key.values() if not kind.of_revolution]
     sizes = [kind.size for kind in instant]
     measured = list(dict.fromkeys(measure_of(kind).key for kind in instant if kind.decides))
     deciding, bounds = [], [0]
@@ -230,7 +258,7 @@ def load_numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
         deciding += [i for name in alike for i in range(span[name].start, span[name].stop)]
         bounds.append(len(deciding))
     numbers: dict[str, Any] = {
-        "begin": [span[key].start for key in by_key],
+        "begin": _ends(all_kinds(mechanism))[:-1],
         "modulus": np.repeat([kind.modulus for kind in instant], sizes),
         "interpolated": np.repeat([kind.interpolated for kind in instant], sizes),
         "measured": [(span[key].start, span[key].stop) for key in measured],
@@ -255,11 +283,11 @@ class Sizes(NamedTuple):
 
 def sizes(mechanism: Mechanism) -> Sizes:
     """Numbers of the loads of a mechanism."""
-    all_kinds = kinds(mechanism).values()
+    every = kinds(mechanism).values()
     return Sizes(
-        sum(kind.size for kind in all_kinds),
-        sum(kind.size for kind in all_kinds if not kind.orders),
-        sum(kind.size for kind in all_kinds if kind.averaged),
+        sum(kind.size for kind in every),
+        sum(kind.size for kind in every if not kind.of_revolution),
+        sum(kind.size for kind in every if kind.averaged),
         len(load_numbers(mechanism)["deciding"]),
     )
 

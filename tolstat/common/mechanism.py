@@ -76,6 +76,8 @@ class Shaft(NamedTuple):
         Names of the unknowns psi and s; empty where it has none. Shafts with the same unknown are one body.
     driven : bool
         Whether the torque about it is a load: it drives what is behind it.
+    borne : bool
+        Whether the loads of its two bearings are loads.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Shaft(NamedTuple):
     turns: str = ""
     slides: str = ""
     driven: bool = False
+    borne: bool = False
 
 
 class Bushing(NamedTuple):
@@ -134,6 +137,24 @@ class Pair(NamedTuple):
     hinge: str
 
 
+class Face(NamedTuple):
+    """Thrust face, on which the end of a pin stops (docs/model.md, "Thrust faces").
+
+    Attributes
+    ----------
+    name : str
+        Place of its load: ``thrust1``.
+    pin : str
+        Lump of the pin.
+    end : int
+        1: outer end of the pin, 1 along e; -1: its inner end.
+    """
+
+    name: str
+    pin: str
+    end: int = 1
+
+
 class Mechanism(NamedTuple):
     """A mechanism.
 
@@ -147,6 +168,10 @@ class Mechanism(NamedTuple):
         Unknowns of shafts, after six of each lump: rotations first.
     cardan : tuple of str
         First member of each Cardan joint, followed by its cross and its output; each is driven by the one before.
+    faces : tuple of Face
+        What holds pins along their axes; without any, pins slide freely.
+    friction : bool
+        Whether pins rub in their holes.
     """
 
     name: str
@@ -158,6 +183,8 @@ class Mechanism(NamedTuple):
     pairs: tuple[Pair, ...]
     unknowns: tuple[str, ...] = ()
     cardan: tuple[str, ...] = ()
+    faces: tuple[Face, ...] = ()
+    friction: bool = False
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -190,6 +217,12 @@ def features(mechanism: Mechanism) -> tuple[str, ...]:
     """Pins and holes, the lumps that have errors: all pins, then all holes, as the lumps are numbered."""
     pins, holes = ({getattr(pair, name) for pair in mechanism.pairs} for name in ("pin", "hole"))
     return tuple(lump.name for names in (pins, holes) for lump in mechanism.lumps if lump.name in names)
+
+
+@cache
+def prefixes(mechanism: Mechanism) -> tuple[str, ...]:
+    """What stands before the names of the parts of each Cardan joint, ``""`` or ``"joint1."``."""
+    return tuple(member.rpartition(".")[0] + "." * ("." in member) for member in mechanism.cardan)
 
 
 @cache
@@ -245,6 +278,10 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "hinge_pin": [member[one.pin] for one in mechanism.hinges],
         "hinge_hole": [member[one.hole] for one in mechanism.hinges],
         "hinge_axis": [one.axis for one in mechanism.hinges],
+        "face_pair": [[pair.pin for pair in mechanism.pairs].index(face.pin) for face in mechanism.faces],
+        "face_end": [face.end for face in mechanism.faces],
+        "friction": mechanism.friction,
+        "borne": [i for i, shaft in enumerate(mechanism.shafts) if shaft.borne],
         "first_filled": lumps + len(edges),
         "cardan": [member[name] for name in mechanism.cardan],
     }

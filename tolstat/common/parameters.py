@@ -41,7 +41,7 @@ def mark_of(mechanism: Mechanism) -> str:
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump or bushing."""
     joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
-    lumps, bushings = len(mechanism.lump_kinds), len(mechanism.bushing_kinds)
+    lumps, bushings, shafts = len(mechanism.lump_kinds), len(mechanism.bushing_kinds), len(mechanism.shafts)
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
         Field("ahead", "rad", "angle of its input fork ahead of the output fork that drives it", shape=(joints,)),
@@ -86,6 +86,24 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "hole_point", "m", "hole centre less the hole's reference point, in axes of its member", shape=(pairs, 3)
         ),
         Field("hole_axis", "1", "direction of the hole axis, in axes of its member", shape=(pairs, 3)),
+        Field(
+            "face_at",
+            "m",
+            "thrust faces: of the pin from P along its axis, of the hole from its centre along its axis",
+            shape=(len(mechanism.faces), 2),
+        ),
+        Field("face_k", "N/m", "stiffness of a thrust face"),
+        Field("face_c", "N*s/m", "damping of a thrust face"),
+        Field("mu", "1", "coefficient of friction of pins in holes"),
+        Field("friction_radius", "m", "distance from the pin's axis at which friction acts"),
+        Field("slip_speed", "m/s", "sliding speed over which friction rises"),
+        Field(
+            "bearing_at",
+            "m",
+            "bearings of shafts: of the nearer and of the farther one, place along z of the shaft",
+            shape=(sum(shaft.borne for shaft in mechanism.shafts), 2),
+        ),
+        Field("unbalance", "kg*m", "unbalance of each shaft, along x and y of its frame", shape=(shafts, 2)),
         Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)

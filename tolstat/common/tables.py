@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
-from tolstat.common.mechanism import Mechanism, features
+from tolstat.common.mechanism import Mechanism, features, prefixes
 from tolstat.common.parameters import numbers, param_fields
 
 SCHEMA_VERSION = 13
@@ -229,6 +229,10 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
+    if mechanism.friction:
+        fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
+    for prefix in prefixes(mechanism) if mechanism.faces else ():
+        fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
     return tuple(fields)
 
 

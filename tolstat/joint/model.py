@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
+from tolstat.common.cardan import PARTS
 from tolstat.common.errors import Fault
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
@@ -16,7 +17,7 @@ from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
-from tolstat.joint.sections import Arm, Bushing, Cross, Hub, Material, Pin, Shaft
+from tolstat.joint.sections import Arm, Bushing, Cross, Friction, Hub, Material, Pin, Shaft, Thrust
 
 TOLD = ("description", "assumed")
 """Keys of a joint file that are about the joint and no part of it."""
@@ -65,6 +66,9 @@ class Joint(Strict):
     cross: Cross
     hub: Hub = Field(default=Hub(), validate_default=True)
     shaft: Shaft
+    thrust: Thrust | None = None
+    """Thrust faces; without the table pins slide freely along their holes"""
+    friction: Friction = Friction()
     bushing: Bushing
     contact: Contact
     bearing: Bearing | None = Field(default=None, validate_default=True)
@@ -175,6 +179,17 @@ class Joint(Strict):
             ``python``: SI values; ``json``: quantities as a file writes them.
         """
         return self.model_dump(mode=mode, exclude_unset=True)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What the joint has beside lumps, bushings and pairs: some of `cardan.PARTS`."""
+        has = {
+            "thrust": self.thrust is not None,
+            "friction": self.friction.mu is not None,
+            "input_bearings": self.shaft.input is not None,
+            "output_bearings": self.shaft.output is not None,
+        }
+        return tuple(part for part in PARTS if has[part])
 
     @property
     def k_cross(self) -> Array:

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, PIN_QUARTERS, SERIES
+from tolstat.common.cardan import ARM_QUARTERS, CARDAN, PIN_QUARTERS, SERIES, extended
 from tolstat.common.loads import split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import MAX_STATIONS
@@ -66,11 +66,6 @@ class Operation(Strict):
 
     _split = model_validator(mode="before")(orders.split)
 
-    @property
-    def mechanism(self) -> Mechanism:
-        """What is simulated."""
-        return CARDAN
-
     @model_validator(mode="after")
     def _check_torsion(self) -> Operation:
         if self.partner is not None:
@@ -114,14 +109,14 @@ class OperationInSeries(Operation):
     series: Series
     """joint 2 and the tube"""
 
-    @property
-    def mechanism(self) -> Mechanism:
-        """See `Operation.mechanism`."""
-        return SERIES
-
-
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
+
+
+def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
+    """What is simulated: a joint, or joints in series, with the parts that the joint has."""
+    base = SERIES if isinstance(operation, OperationInSeries) else CARDAN
+    return extended("+".join((base.name, *joint.parts)))
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -170,7 +165,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     ndarray, shape (n,), dtype PARAM
         Row i holds the parameters of joint i.
     """
-    mechanism = operation.mechanism
+    mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
     for name, value in _constants(joint).items():
         params[name] = value
@@ -201,6 +196,13 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
         deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"])
         params["clearance"][:, i] = _clearance(joint.contact, *deviations)
+    half = 0.5 * joint.contact.z
+    for i, face in enumerate(mechanism.faces):
+        prefix = face.name.rpartition(".")[0]
+        play = joint.thrust.end_play + errors[f"{prefix}{'.' if prefix else ''}thrust.end_play"]
+        params["face_at"][:, i, 0], params["face_at"][:, i, 1] = half, half + 0.5 * play
+    if mechanism.friction:
+        params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params
 
 
@@ -224,6 +226,15 @@ def _constants(joint: Joint) -> dict[str, Any]:
             [(0.0, 0.0, l_f), (R, 0.0, l_f)],
         ],
         "Js": shaft.Js,
+        "face_k": joint.thrust.k if joint.thrust else 0.0,
+        "face_c": joint.thrust.c if joint.thrust else 0.0,
+        "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
+        "slip_speed": joint.friction.slip_speed,
+        "bearing_at": [
+            (sign * ends.bearings[0], sign * ends.bearings[1])
+            for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
+            if ends is not None
+        ],
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
         "k_a": shaft.k_a,

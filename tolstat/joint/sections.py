@@ -148,8 +148,44 @@ RIGID, FREE = "rigid", "free"
 """Words of ``shaft.axial``."""
 
 
+class Ends(Strict):
+    """What carries a shaft."""
+
+    bearings: tuple[Length, Length] = Field(examples=[["80 mm", "240 mm"]])
+    """distances of the shaft's two bearings from the joint's centre, along the shaft; the nearer one is bearing a"""
+
+    @field_validator("bearings")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not value[0] < value[1]:
+            raise refuse("{bearings} are not two places in order", "give the nearer bearing first", "bearings")
+        return value
+
+
+class Thrust(Strict):
+    """Thrust faces: the bottoms of the bearing cups, held by snap rings, which hold the cross along its pins."""
+
+    end_play: units.Length = Field(examples=["0.02 mm"])
+    """play of the cross along a pair of pins, from one face to the other; negative: preload"""
+    k: Stiffness = Field(examples=["1e8 N/m"])
+    """stiffness of one face, its cup and its ring"""
+    c: units.Damping = Field(default=2e3)
+    """damping of one face"""
+
+
+class Friction(Strict):
+    """Friction of the pins in their bearings."""
+
+    mu: Ratio | None = Field(default=None, examples=[0.05])
+    """coefficient of friction: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15; when left out: no friction"""
+    radius: Length | None = Field(default=None, examples=["12.5 mm"])
+    """distance from the pin's axis at which surfaces slide; when left out: contact.D_P/2"""
+    slip_speed: Annotated[units.Velocity, POSITIVE] = 1e-2
+    """sliding speed over which friction rises"""
+
+
 class Shaft(Strict):
-    """Output shaft, and what holds it along its axis.
+    """Output shaft, and what holds it along its axis; bearings of both shafts.
 
     A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
     """
@@ -165,6 +201,10 @@ class Shaft(Strict):
     )
     """what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose bearing; or the
     stiffness of the bearings of both shafts in series"""
+    input: Ends | None = None
+    """bearings of the input shaft"""
+    output: Ends | None = None
+    """bearings of the output shaft"""
 
     @field_validator("axial")
     @classmethod

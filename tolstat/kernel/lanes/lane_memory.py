@@ -56,7 +56,7 @@ def record_of_lanes(record):
             ty = types.NestedArray(value, shape) if shape else value
         fields.append((name, {"type": ty, "offset": field.offset}))
     of_lanes = LaneRecord(fields, record.size, record.aligned)
-    of_lanes.constants = constants
+    of_lanes.constants = {name: value if value.ndim > 0 else int(value) for name, value in constants.items()}
     return of_lanes
 
 

@@ -47,22 +47,40 @@ def smooth_step_slope(x):
 
 
 @njit
+def in_hole(pin, lever, par, work):
+    """Position of a point of a pin in the frame of its hole's member, and its velocity relative to the hole there.
+
+    `lever`: from the pin's reference point, in axes of the pin's member, m.
+    """
+    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
+    point = to_hole(hinge, add(row(work.pos, body), lever), par, work)
+    velocity = to_hole(hinge, add(row(work.vel, body), cross(row(work.spin, body), lever)), par, work)
+    velocity = velocity_in(hinge, velocity, point, par, work)
+    hole_lever = sub(point, row(work.pos, hole))
+    return point, sub(velocity, add(row(work.vel, hole), cross(row(work.spin, hole), hole_lever)))
+
+
+@njit
+def push(pin, point, f_hole, par, work):
+    """Add a force at a point to the hole of a pin, and its opposite to the pin; in axes of the hole's member."""
+    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
+    accumulate(work.force, hole, f_hole, cross(sub(point, row(work.pos, hole)), f_hole))
+    f_pin = scale(-1.0, to_pin(hinge, f_hole, par, work))
+    lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
+    accumulate(work.force, body, f_pin, cross(lever, f_pin))
+
+
+@njit
 def locate(pin, par, work):
     """Write position, normal, penetration and velocity of each station of `pin` to ``work.station[pin]``."""
-    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
+    body, hole = par.pin[pin], par.hole[pin]
     axis = turn(work.rot, hole, row(par.hole_axis, pin))
     centre = add(row(work.pos, hole), turn(work.rot, hole, row(par.hole_point, pin)))
     origin = turn(work.rot, body, row(par.pin_point, pin))
     direction = turn(work.rot, body, row(par.pin_axis, pin))
     for j in range(par.n_stations):
         lever = axpy(par.station_s[j], direction, origin)
-        # the station and its velocity relative to the hole's ideal frame, in axes of that frame
-        point = to_hole(hinge, add(row(work.pos, body), lever), par, work)
-        velocity = to_hole(hinge, add(row(work.vel, body), cross(row(work.spin, body), lever)), par, work)
-        velocity = velocity_in(hinge, velocity, point, par, work)
-        hole_lever = sub(point, row(work.pos, hole))
-        velocity = sub(velocity, add(row(work.vel, hole), cross(row(work.spin, hole), hole_lever)))
-
+        point, velocity = in_hole(pin, lever, par, work)
         d = sub(point, centre)
         gap = axpy(-dot(d, axis), axis, d)
         rho = math.sqrt(dot(gap, gap))
@@ -118,7 +136,6 @@ def classify(pin, par, work):
 @njit
 def contact_load(pin, par, work):
     """Add the contact forces of `pin` to pin and hole; write ``work.contact[pin]`` and ``work.mode[pin]``."""
-    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     locate(pin, par, work)
     press(pin, par, work)
     total = (0.0, 0.0, 0.0)
@@ -132,10 +149,7 @@ def contact_load(pin, par, work):
         point = (station[POINT], station[POINT + 1], station[POINT + 2])
         f_hole = axpy(station[FORCE], n, scale(drag, m))
         total = add(total, f_hole)
-        accumulate(work.force, hole, f_hole, cross(sub(point, row(work.pos, hole)), f_hole))
-        f_pin = scale(-1.0, to_pin(hinge, f_hole, par, work))
-        lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
-        accumulate(work.force, body, f_pin, cross(lever, f_pin))
+        push(pin, point, f_hole, par, work)
     work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
     work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]
     work.contact[pin, RESULTANT] = math.sqrt(dot(total, total))

@@ -9,8 +9,10 @@ import math
 from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
+from tolstat.kernel.mechanics.friction import rub
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.rotation import about_z, coefficients, exponential, spin, spin_bias, spin_rate, unspin
+from tolstat.kernel.mechanics.thrust import thrust_load
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, put, row, scale, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
@@ -80,6 +82,11 @@ def forces(t, q, v, par, work):
         bushing_load(i, par, work)
     for pin in range(work.contact.shape[0]):
         contact_load(pin, par, work)
+    for face in range(par.face_pair.shape[0]):
+        thrust_load(face, par, work)
+    if par.friction == 1:
+        for pin in range(work.contact.shape[0]):
+            rub(pin, par, work)
 
 
 @njit

@@ -7,12 +7,13 @@ import math
 
 from tolstat.common.load_kinds import CONTACTS
 from tolstat.kernel.mechanics.vector import row
+from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
-(FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE) = range(8)
-LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS = range(8, 12)
-"""Kinds, in the order of `load_kinds.kinds`; ``par.begin`` has the first element of each."""
+(FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE, THRUST, NEAR, FAR) = range(11)
+LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS, LOSS = range(11, 18)
+"""Kinds, in the order of `load_kinds.all_kinds`; ``par.begin`` has the first element of each."""
 OF_FORCES, OF_TORQUES = range(2)
 """Measures, whose largest load changes are relative to: rows of ``par.measured`` and ``par.of_measure``."""
 
@@ -21,7 +22,8 @@ OF_FORCES, OF_TORQUES = range(2)
 def shaft_load(shaft, par, work):
     """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
 
-    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a.
+    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a. Its unbalance adds to
+    the force across.
 
     Parameters
     ----------
@@ -37,7 +39,31 @@ def shaft_load(shaft, par, work):
         s, rate = work.pos[body, 2], work.vel[body, 2]
         z = where(par.slides > 0, par.k_a * s + par.c_a * rate - par.F_a, z)
         m_x, m_y = m_x - s * y, m_y + s * x
+    if par.borne.shape[0] > 0:
+        speed = work.frame_w[par.frame[body], 2]
+        x += par.unbalance[shaft, 0] * speed * speed
+        y += par.unbalance[shaft, 1] * speed * speed
     return (x, y, z), (m_x, m_y, m_z)
+
+
+@njit
+def bearing_loads(i, force, moment, par):
+    """Loads of both bearings of shaft ``par.borne[i]`` along an axis across it: the nearer one's and the farther one's.
+
+    Parameters
+    ----------
+    i : int
+        Number among the shafts whose bearings are known.
+    force : float
+        Force on the shaft along the axis, N.
+    moment : float
+        Moment about O on it that a force along the axis, at a place of positive z, adds to, N m.
+    par : record of PARAM
+        The joint.
+    """
+    near, far = par.bearing_at[i, 0], par.bearing_at[i, 1]
+    at_far = (moment - near * force) / (far - near)
+    return force - at_far, at_far
 
 
 @njit
@@ -78,6 +104,14 @@ def write_loads(v, par, work):
         for i in range(par.driven.shape[0]):
             if par.driven[i] == shaft:
                 loads[begin[DRIVE] + i] = abs(m[2])
+    for face in range(par.face_pair.shape[0]):
+        loads[begin[THRUST] + face] = work.face[face, FORCE]
+    for i in range(par.borne.shape[0]):
+        f, m = shaft_load(par.borne[i], par, work)
+        near_x, far_x = bearing_loads(i, f[0], m[1], par)
+        near_y, far_y = bearing_loads(i, f[1], -m[0], par)
+        loads[begin[NEAR] + i] = near_x * near_x + near_y * near_y
+        loads[begin[FAR] + i] = far_x * far_x + far_y * far_y
 
 
 @njit

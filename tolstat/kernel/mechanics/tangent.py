@@ -182,10 +182,9 @@ def connect_shaft(unknown, arm, f, torque, edge):
 
 
 @njit
-def _directions(pin, j, par, work):
-    """Write d(displacements of station `j` along n and m) / d(pin, hole) to ``work.vectors``."""
+def _directions(pin, station, par, work):
+    """Write d(displacements of a station along n and m) / d(pin, hole) to ``work.vectors``."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
-    station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
     lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
     hole_lever = sub(point, row(work.pos, hole))
@@ -218,7 +217,6 @@ def contact_tangent(pin, cv, par, work):
     What damping and film couple, a force along n with a displacement along m or the reverse, is not symmetric, and left
     out.
     """
-    by_n, by_m = work.by_n, work.by_m
     for j in range(par.n_stations):
         station = work.station[pin, j]
         touching = station[DELTA] > 0
@@ -228,11 +226,26 @@ def contact_tangent(pin, cv, par, work):
         by_rho = where(touching, 1 / station[RHO], 0.0)
         nn = station[SLOPE] + cv * station[DAMPING]
         mm = station[FORCE] * by_rho + station[FILM] * (cv - station[V_NORMAL] * by_rho)
-        _directions(pin, j, par, work)
-        n, m = work.vectors[0], work.vectors[1]
-        for i in range(12):
-            by_n[i], by_m[i] = nn * n[i], mm * m[i]
-        _add_dyads(pin, n, by_n, m, by_m, par, work)
+        point_tangent(pin, station, nn, mm, par, work)
+
+
+@njit
+def point_tangent(pin, station, nn, mm, par, work):
+    """Add the stiffness `nn` along n and `mm` along m of a station, N/m."""
+    _directions(pin, station, par, work)
+    n, m, by_n, by_m = work.vectors[0], work.vectors[1], work.by_n, work.by_m
+    for i in range(12):
+        by_n[i], by_m[i] = nn * n[i], mm * m[i]
+    _add_dyads(pin, n, by_n, m, by_m, par, work)
+
+
+@njit
+def friction_tangent(pin, cv, par, work):
+    """Add the friction of `pin`, its change with the force that presses left out; `cv`: 1/s."""
+    for j in range(par.n_stations):
+        rubbing = work.rubbing[pin, j]
+        if any_of(rubbing[DAMPING] > 0):
+            point_tangent(pin, rubbing, cv * rubbing[SLOPE], cv * rubbing[DAMPING], par, work)
 
 
 @njit
@@ -257,6 +270,14 @@ def assemble(cv, ca, cv_axial, par, work):
         bushing_tangent(i, cv, par, work)
     for pin in range(work.contact.shape[0]):
         contact_tangent(pin, cv, par, work)
+    for face in range(par.face_pair.shape[0]):
+        of_face = work.face[face]
+        if any_of(of_face[FORCE] > 0):
+            along = of_face[SLOPE] + cv * of_face[DAMPING]
+            point_tangent(par.face_pair[face], of_face, along, 0.0 * along, par, work)
+    if par.friction == 1:
+        for pin in range(work.contact.shape[0]):
+            friction_tangent(pin, cv, par, work)
     rotations = par.Js.shape[0]
     for u in range(rotations):
         work.corner[u, u] += ca * par.Js[u]

@@ -47,6 +47,10 @@ def work_fields(mechanism):
         "loads": (sizes(mechanism).instant,),  # as `loads.write_loads` writes them
         "shafts": (shafts, 6),  # force and moment about O on each shaft, in axes that do not turn
         "station": (pairs, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
+        "face": (len(mechanism.faces), N_STATION),  # thrust faces, likewise; their normal is the hole's axis
+        # where pins rub, likewise; normal: direction of sliding, tangent: across it
+        "rubbing": (pairs if mechanism.friction else 0, MAX_STATIONS, N_STATION),
+        "loss": (pairs if mechanism.friction else 0,),  # power of each pin's friction, W
         "block": (blocks_of(mechanism), 6, 6),  # matrices of the tangent, factorised in place; rows of what goes first
         "edge": (border, lumps, 6),  # its columns of the shafts' unknowns, rows of the lumps
         "corner": (border, border),  # its rows and columns of these; factorised in place

@@ -8,7 +8,15 @@ amplitude of its cosine. The sense of rotation and the angle of the first sample
 import math
 
 from tolstat.common.load_kinds import ORDERS
-from tolstat.kernel.mechanics.loads import DRIVE_ORDERS, LATERAL_ORDERS, MOMENT_ORDERS, PSI_ORDERS
+from tolstat.kernel.mechanics.loads import (
+    DRIVE_ORDERS,
+    FAR_ORDERS,
+    LATERAL_ORDERS,
+    MOMENT_ORDERS,
+    NEAR_ORDERS,
+    PSI_ORDERS,
+    bearing_loads,
+)
 from tolstat.kernel.simd.jit import njit
 
 
@@ -23,6 +31,14 @@ def semi_major(x, y, n):
 def plus(total, value, c, s):
     """Return the pair of sums `total` plus `value` times cosine `c` and sine `s`."""
     return total[0] + value * c, total[1] + value * s
+
+
+@njit
+def bearing_sums(j, fx, fy, mx, my, par):
+    """Sums of the loads of both bearings of a shaft, from those of its force and moment."""
+    (near_xc, far_xc), (near_xs, far_xs) = bearing_loads(j, fx[0], my[0], par), bearing_loads(j, fx[1], my[1], par)
+    (near_yc, far_yc), (near_ys, far_ys) = bearing_loads(j, fy[0], -mx[0], par), bearing_loads(j, fy[1], -mx[1], par)
+    return (near_xc, near_xs), (near_yc, near_ys), (far_xc, far_xs), (far_yc, far_ys)
 
 
 @njit
@@ -41,6 +57,11 @@ def of_order(i, par, samples, out):
             c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
         out.largest[par.begin[LATERAL_ORDERS] + number * shaft + i] = semi_major(fx, fy, n)
         out.largest[par.begin[MOMENT_ORDERS] + number * shaft + i] = semi_major(mx, my, n)
+        for j in range(par.borne.shape[0]):
+            if par.borne[j] == shaft:
+                near_x, near_y, far_x, far_y = bearing_sums(j, fx, fy, mx, my, par)
+                out.largest[par.begin[NEAR_ORDERS] + number * j + i] = semi_major(near_x, near_y, n)
+                out.largest[par.begin[FAR_ORDERS] + number * j + i] = semi_major(far_x, far_y, n)
         for j in range(par.driven.shape[0]):
             if par.driven[j] == shaft:
                 out.largest[par.begin[DRIVE_ORDERS] + number * j + i] = semi_major(mz, none, n)

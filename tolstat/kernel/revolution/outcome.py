@@ -46,7 +46,9 @@ def inside_model(par):
         good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
         good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
         bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
-    good = good and bears
+    good = good and bears and par.mu >= 0 and par.face_k >= 0
+    for face in range(par.face_pair.shape[0]):
+        good = good and abs(par.face_at[face, 1] - par.face_at[face, 0]) <= MAX_SHIFT * par.R
     for pin in range(par.pin.shape[0]):
         good = good and 0 <= par.clearance[pin] <= MAX_SHIFT * par.R
         good = good and is_near(par.pin[pin], row(par.pin_point, pin), row(par.pin_axis, pin), par)

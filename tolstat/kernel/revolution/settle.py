@@ -9,7 +9,7 @@ from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import sizes
 from tolstat.common.mechanism import Mechanism
 from tolstat.kernel.mechanics.dynamics import forces
-from tolstat.kernel.mechanics.loads import OF_FORCES, OF_TORQUES, complete_loads, size_of, write_loads
+from tolstat.kernel.mechanics.loads import LOSS, OF_FORCES, OF_TORQUES, complete_loads, size_of, write_loads
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
@@ -37,6 +37,7 @@ def sample_dtype(mechanism):
             ("shafts", "f8", (shafts, 6)),  # force and moment about O on each shaft, in axes that do not turn
             ("tau", "f8"),
             ("psi", "f8"),  # its error, eq. (13)
+            ("loss", "f8", (pins if mechanism.friction else 0,)),  # power of each pin's friction, W
             ("mode", "u1", (pins,)),
             ("pressed", "u2", (pins,)),  # bit j: station j of the pin carries a force
             ("q", "f8", (mechanism.dof,)),  # m, rad
@@ -125,6 +126,8 @@ def record(k, lane, par, work, samples):
     for shaft in range(work.shafts.shape[0]):
         for i in range(6):
             sample.shafts[shaft, i] = pick(work.shafts[shaft, i], lane)
+    for pin in range(work.loss.shape[0]):
+        sample.loss[pin] = pick(work.loss[pin], lane)
     for pin in range(work.mode.shape[0]):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
@@ -281,6 +284,21 @@ def summarise(par, samples, out):
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par, samples, out)
     write_orders(par, samples, out)
+    if par.friction == 1:
+        write_losses(par, samples, out)
+
+
+@njit
+def write_losses(par, samples, out):
+    """Write the mean power of friction over the recorded revolution, of each pin and of all."""
+    first, pins = par.begin[LOSS], par.pin.shape[0]
+    out.largest[first + pins] = 0.0
+    for pin in range(pins):
+        total = 0.0
+        for s in range(samples.size):
+            total += samples[s].loss[pin]
+        out.largest[first + pin] = total / samples.size
+        out.largest[first + pins] += out.largest[first + pin]
 
 
 @njit

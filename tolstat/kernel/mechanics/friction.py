@@ -1,0 +1,48 @@
+"""Friction of pins in their holes, along and around them together (docs/model.md, "Friction in the bearings")."""
+
+import math
+
+from tolstat.kernel.mechanics.contact import in_hole, push
+from tolstat.kernel.mechanics.motion import to_pin
+from tolstat.kernel.mechanics.vector import axpy, choose, cross, dot, row, scale, sub
+from tolstat.kernel.mechanics.work import DAMPING, FORCE, NORMAL, POINT, SLOPE, TANGENT
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import any_of, where
+
+
+@njit
+def rub(pin, par, work):
+    """Add the friction of a pin to pin and hole; write ``work.rubbing[pin]`` and ``work.loss[pin]``.
+
+    Where a station presses, the surfaces slide with w; friction is mu f w / sqrt(w^2 + v_s^2). Its slopes by w along
+    and across w are those of the tangent, SLOPE and DAMPING; that by the force f is not symmetric, and left out.
+    """
+    body, hinge, loss = par.pin[pin], par.hinge[pin], 0.0 * work.drive[0]
+    for j in range(par.n_stations):
+        station, rubbing = work.station[pin, j], work.rubbing[pin, j]
+        pressed = station[FORCE] > 0
+        if not any_of(pressed):
+            rubbing[FORCE] = rubbing[SLOPE] = rubbing[DAMPING] = 0.0
+            continue
+        normal = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
+        point = (station[POINT], station[POINT + 1], station[POINT + 2])
+        surface = to_pin(hinge, axpy(par.friction_radius, normal, point), par, work)
+        point, velocity = in_hole(pin, sub(surface, row(work.pos, body)), par, work)
+        w = axpy(-dot(velocity, normal), normal, velocity)
+        square = dot(w, w)
+        regular = square + par.slip_speed * par.slip_speed
+        drag = par.mu * station[FORCE] / math.sqrt(regular)
+        sliding = square > 0
+        along = choose(
+            sliding,
+            scale(1 / math.sqrt(where(sliding, square, 1.0)), w),
+            (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2]),
+        )
+        across = cross(normal, along)
+        for k in range(3):
+            rubbing[POINT + k], rubbing[NORMAL + k], rubbing[TANGENT + k] = point[k], along[k], across[k]
+        rubbing[FORCE] = drag * math.sqrt(square)
+        rubbing[SLOPE], rubbing[DAMPING] = drag * (1 - square / regular), drag
+        push(pin, point, scale(drag, w), par, work)
+        loss += drag * square
+    work.loss[pin] = loss

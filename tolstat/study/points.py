@@ -278,9 +278,10 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     tuple
         Key path, what was found, remedy.
     """
+    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        remedy = "remove it" if in_series else 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
     for key in ("speed", "torque"):
@@ -290,7 +291,6 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
-    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
     for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
         found = "stands beside [series]: both joints are simulated, none stands for the other"
         yield path, found, "remove it, or [series]"

@@ -85,7 +85,7 @@ class LimitPlan:
 
 @dataclass(frozen=True)
 class Reversals:
-    """Joints of the pilot whose torque reverses, so that they rattle: see `ideal.reversal_torque`. None is counted in series.
+    """Joints of the pilot whose torque reverses, so that they rattle, see `ideal.reversal_torque`; in series none.
 
     Attributes
     ----------

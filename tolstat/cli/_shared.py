@@ -263,7 +263,7 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
     if note := points.note_on_shafts(
-        study.tolerances, axial, points.with_free_shaft(str(path), path.stem, study.joint, study.mechanism)
+        study.tolerances, axial, points.with_free_shaft(str(path), path.stem, study.joint)
     ):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)

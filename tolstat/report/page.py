@@ -33,7 +33,7 @@ from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 from tolstat.store.view import View
-from tolstat.study.assumptions import AXIAL, assumptions, unselected
+from tolstat.study.assumptions import assumptions, unselected
 
 REPLAYED = 1000
 """Default number of joints whose load histories are evaluated: some 2 s if they are simulated again."""
@@ -205,7 +205,7 @@ def scene(view: View) -> tuple[str, str]:
         return f"{words} ({'assumed' if any(name.startswith(key) for name in assumed) else 'given'})"
 
     first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
-    second = f"{marked(mounting, AXIAL)}; {marked(law, variations.LAW)}."
+    second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."
     return text.capital(first), text.capital(second)
 
 

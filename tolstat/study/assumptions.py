@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.joint import derived
@@ -22,8 +21,6 @@ from tolstat.study.selection import error_units, excludes
 from tolstat.study.study import Study
 from tolstat.study.tolerances.zones import short_axes
 
-AXIAL = "shaft.axial"
-"""Key of the mounting of the shafts."""
 _AXES = {"positions": ("offset_e", "offset_t", "offset_z"), "angles": ("tilt_t", "tilt_z"), "diameters": ("diameter",)}
 """Errors of a pin or hole by what they are about."""
 
@@ -53,13 +50,10 @@ class Assumption(NamedTuple):
 def assumptions(study: Study) -> tuple[Assumption, ...]:
     """Assumptions that hold for the joint of a study: those of its joint file, those of the study, and measured parts.
 
-    An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name. In
-    series, where shafts are held, that on the mounting of the shafts is left out, too.
+    An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
     """
     replaced = {entry.name for entry in study.assumed}
     of_joint = [entry for entry in study.joint.assumed if entry.name not in (*given(study), *replaced)]
-    if study.mechanism != CARDAN:
-        of_joint = [entry for entry in of_joint if not any(AXIAL in leaves(value) for value in entry.values)]
     of_values = [
         Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
         for entry in (*of_joint, *study.assumed)

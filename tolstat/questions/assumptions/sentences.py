@@ -11,10 +11,9 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.display import table, text
 from tolstat.display.verdict import WORDS
-from tolstat.questions.assumptions.variations import ALL, SHAFT, Standing, widths, written
+from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
-from tolstat.study.assumptions import AXIAL
 from tolstat.study.measured import left_open
 from tolstat.study.widths import COARSER, HALF
 

@@ -19,7 +19,7 @@ from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
-from tolstat.study.assumptions import AXIAL, Assumption, assumptions, given, is_drawn, together
+from tolstat.study.assumptions import Assumption, assumptions, given, is_drawn, together
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -32,7 +32,7 @@ ALL = "all assumptions"
 BETTER, WORSE = "all at better values", "all at worse values"
 """What the variations of all assumptions together are called."""
 
-LAW = "contact.law"
+AXIAL, LAW = "shaft.axial", "contact.law"
 SHAFT = {"free": ("shaft slides", "if the shaft slides"), "rigid": ("shaft rigid", "if the shaft is held rigidly")}
 """Mounting of the shafts: as a label, and as a condition."""
 _LONGEST = 12

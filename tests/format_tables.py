@@ -66,7 +66,7 @@ def axis_table() -> str:
         told = held if len(held) <= 8 else [*held[:2], "...", held[-1]]
         lines.append(f"| `{name}` | {', '.join(told)} | 1 | {text} |")
     for name, values in {"theta": "2 pi k / steps_per_rev", "harmonic": "0, 1, 2, ..."}.items():
-        _, unit, text = layout.scale_of(name, 4)
+        _, unit, text = layout.scale_of(name, 4, CARDAN)
         lines.append(f"| `{name}` | {values} | {unit} | {text} |")
     return "\n".join(lines)
 

@@ -15,7 +15,9 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field
 
 from tolstat.common import loads, units
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import Joint, Operation, OperationInSeries, Series, orders
@@ -300,8 +302,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
 
 
-def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
-    """Command that runs a study with an output shaft that is free along its axis.
+def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:
+    """Command that runs a study with an output shaft that is free along its axis; empty where it cannot be.
 
     Parameters
     ----------
@@ -309,7 +311,11 @@ def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
         Study file, and its name without ending.
     joint : Joint
         The study's joint; what a free shaft needs and it lacks is in the command, too.
+    mechanism : Mechanism
+        What is simulated: shafts of joints in series are held.
     """
+    if mechanism != CARDAN:
+        return ""
     needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
     lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
     settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
@@ -326,7 +332,7 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
     axial : iterable of float or str
         ``shaft.axial`` of each variant.
     command : str
-        The command.
+        The command; empty if there is none.
 
     Returns
     -------
@@ -336,8 +342,8 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
     if not along or any(value != RIGID for value in axial):
         return ""
-    return (
+    note = (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        "them: some loads are larger than with a spline.\n"
-        f"With a free output shaft: {command}"
+        "them: some loads are larger than with a spline."
     )
+    return f"{note}\nWith a free output shaft: {command}" if command else note

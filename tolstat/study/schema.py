@@ -144,7 +144,9 @@ def _keys(names: Iterable[str]) -> str:
     features_of: dict[str, list[str]] = {}
     for feature, keys in halves_of.items():
         features_of.setdefault("|".join(keys), []).append(re.escape(feature))
-    return "|".join(f"(?:{'|'.join(features)}|{FEATURE})(?:{ends})" for ends, features in features_of.items())
+    return "|".join(
+        f"(?:{'|'.join(features)}|{FEATURE if ends else WILD})(?:{ends})" for ends, features in features_of.items()
+    )
 
 
 def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:

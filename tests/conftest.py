@@ -19,6 +19,7 @@ from tests.support.of_cardan import PARAM
 from tolstat import joint as joints
 from tolstat.campaign import pool
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.joint import orders
 from tolstat.store import metadata
 
@@ -58,7 +59,7 @@ def with_orders(
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""
     still = joints.Operation.model_construct(alpha=0, speed=1, torque=0)
-    own = joints.perturb(joint_with_law(law), still, joints.nominal_errors(1))
+    own = joints.perturb(joint_with_law(law), still, joints.nominal_errors(1, CARDAN))
     for name in (*(name for name in PARAM.names if name.startswith("station_")), "n_stations", "needle_b"):
         par[name] = own[name][0]
     return par
@@ -95,7 +96,7 @@ def params(cirelli: joints.Joint) -> Params:
         alpha: float = 0.0, speed: float = 500 * np.pi / 30, torque: float = 100.0, **errors: float
     ) -> np.recarray[Any, np.dtype[np.void]]:
         operation = joints.Operation.model_construct(alpha=alpha, speed=speed, torque=torque)
-        table = joints.nominal_errors(1)
+        table = joints.nominal_errors(1, CARDAN)
         for name, value in errors.items():
             table[name.replace("__", ".")] = value
         row = joints.perturb(cirelli, operation, table)

@@ -183,7 +183,7 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
         ("a", "b"), size[..., None], 0.0 * size[..., None], np.where(np.isnan(size), size, 1.0)
     )
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    joints = Joints(state, Independent(), settings, n, (("", 1.0),))
+    joints = Joints(state, Independent(), settings, CARDAN, n, (("", 1.0),))
     return Counted(**vars(joints), cycles=cycles, nominal=cycles.rows(slice(0)), apart=0.0), size, line
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tests.support import synthetic
 from tolstat import joint, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.study import costs, scaling
 from tolstat.study.file import SECTIONS as OF_STUDY
@@ -197,7 +198,7 @@ def test_costs_beyond_all_numbers_are_refused(tmp_path: Path, entry: str) -> Non
     (tmp_path / "a.toml").write_text(synthetic.STUDY, encoding="utf-8")
     (tmp_path / "costs.toml").write_text(f'"pin*.offset_t" = {entry}', encoding="utf-8")
     with pytest.raises(InputError, match="costs more than a number can hold") as raised:
-        costs.of(scaling.tolerances(study.load(tmp_path / "a.toml")), tmp_path / "costs.toml")
+        costs.of(scaling.tolerances(study.load(tmp_path / "a.toml")), CARDAN, tmp_path / "costs.toml")
     check(raised.value)
 
 

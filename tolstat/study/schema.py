@@ -144,7 +144,8 @@ def _keys(names: Iterable[str]) -> str:
     features_of: dict[str, list[str]] = {}
     for feature, keys in halves_of.items():
         features_of.setdefault("|".join(keys), []).append(re.escape(feature))
-    return "|".join(f"(?:{'|'.join(features)}|{FEATURE})(?:{ends})" for ends, features in features_of.items())
+    wild = {ends: FEATURE if ends else WILD for ends in features_of}
+    return "|".join(f"(?:{'|'.join(features)}|{wild[ends]})(?:{ends})" for ends, features in features_of.items())
 
 
 def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:

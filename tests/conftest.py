@@ -19,6 +19,7 @@ from tests.support.of_cardan import CARDAN, PARAM
 from tolstat import joint as joints
 from tolstat.campaign import pool
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.joint import orders
 from tolstat.store import metadata
 

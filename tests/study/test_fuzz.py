@@ -185,7 +185,7 @@ def test_costs_are_read_or_refused(tmp_path: Path, rows: list[list[str]], kind: 
         lines += [",".join([key, *(str(entry.get(name, "")) for name in names)]) for key, entry in table.items()]
     path.write_text("\n".join(lines), encoding="utf-8", errors="ignore", newline="")
     try:
-        read = costs.of(tolerances, path)
+        read = costs.of(tolerances, CARDAN, path)
     except InputError as error:
         check(error)
     else:

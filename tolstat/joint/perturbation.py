@@ -71,6 +71,11 @@ class Operation(Strict):
         """What is simulated."""
         return CARDAN
 
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """Misalignment of each joint (rad)."""
+        return (self.alpha,)
+
     @model_validator(mode="after")
     def _check_torsion(self) -> Operation:
         if self.partner is not None:
@@ -91,7 +96,7 @@ class Series(Strict):
 
     alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
     """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
-    angle: units.Angle = Field(default=np.pi, examples=["0 deg"])
+    angle: units.Angle = Field(default=np.pi, json_schema_extra={"default": "180 deg"}, examples=["0 deg"])
     """angle of the plane of joint 2 ahead of that of joint 1, about the tube; at 180 deg, the default, the outer shafts
     of joints of equal misalignment are parallel, at 0 deg both joints bend the same way"""
     offset: units.Angle = Field(default=0.0, examples=["5 deg"])
@@ -118,6 +123,11 @@ class OperationInSeries(Operation):
     def mechanism(self) -> Mechanism:
         """See `Operation.mechanism`."""
         return SERIES
+
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """See `Operation.alphas`."""
+        return self.alpha, self.series.alpha
 
 
 MEANS = ("alpha", "speed", "torque", "axial_force")

@@ -123,7 +123,7 @@ def test_an_array_of_another_shape(x, words):
 
 def test_kernels_that_some_joints_need_are_compiled_before_processes_start(monkeypatch):
     compiled = []
-    monkeypatch.setattr(functions, "compile_missing", lambda options, params=None: compiled.append(params))
+    monkeypatch.setattr(functions, "compile_missing", lambda mechanism, options, params=None: compiled.append(params))
     monkeypatch.setattr(functions.pool, "map_blocks", lambda work, blocks, workers: (_ for _ in ()))
     f = tolstat.function(study_of(TEXT), ["psi"], workers=2)
     f(np.zeros((functions.LEAST_SHARED, len(f.names))))

@@ -16,6 +16,7 @@ from tests.support.reports import call
 from tolstat import sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign import run as campaign
+from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
@@ -179,7 +180,7 @@ def test_a_load_that_is_zero_without_errors_has_no_change():
     joint, nominal = synthetic.results(2)[:1].copy(), synthetic.results(2)[1:2].copy()
     joint["F_max"], nominal["F_max"] = 660.0, 600.0
     joint["lateral_orders_max"], nominal["lateral_orders_max"] = 0.3, 1e-4
-    made = replay.CaseResult(Simulation(joint, {}), np.zeros(1, PARAM), 0.1, Options(), nominal)
+    made = replay.CaseResult(Simulation(joint, {}), np.zeros(1, PARAM), 0.1, Options(), CARDAN, nominal)
     largest = made.summary()["max"]
     assert largest["input.lateral_1x"]["change"] is None
     assert largest["cross1.F"]["change"] == pytest.approx(0.1)

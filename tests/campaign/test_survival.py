@@ -24,6 +24,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
 from tolstat.campaign.pool import WorkerDied
 from tolstat.campaign.remedy import Retry, parse_retry
+from tolstat.common.cardan import CARDAN
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status, from_names
@@ -199,7 +200,7 @@ def children(parent: int) -> list[int]:
 def test_states_without_results_have_none(tmp_path: Path) -> None:
     for status in Status:
         if status not in SIMULATED and status != Status.PENDING:
-            blank = without_simulation(2, status, fakes.SPECS)
+            blank = without_simulation(2, status, fakes.SPECS, CARDAN)
             assert (blank.results["status"] == status).all()
             assert np.isnan(blank.results["T_mean"]).all()
             assert np.isnan(blank.histories["loads"]).all()

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.support import damage, fakes, synthetic
-from tests.support.of_cardan import LOAD_KINDS
+from tests.support.of_cardan import CARDAN, LOAD_KINDS
 from tests.support.reports import call
 from tolstat import joint, sampling, study
 from tolstat.analysis import accuracy
@@ -65,7 +65,7 @@ def coarse(plan, told):
 
 def force_and_torque(base, other):
     """Error of the largest |F| and |T| of each joint, (m, 2)."""
-    return accuracy.by_kind(accuracy.differences(base, other))[:, :2]
+    return accuracy.by_kind(accuracy.differences(base, other, CARDAN), CARDAN)[:, :2]
 
 
 @pytest.mark.slow
@@ -76,7 +76,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
     """
     own = {name: check.results for name, check in coarse.checks.items() if name != "reference"}
     true = force_and_torque(coarse.base, coarse.checks["reference"].results)
-    ratio = accuracy.by_kind(accuracy.numerical(coarse.base, own))[:, :2] / true
+    ratio = accuracy.by_kind(accuracy.numerical(coarse.base, own, CARDAN), CARDAN)[:, :2] / true
     crossing = true < 0.1 * np.median(true, axis=0)
     assert crossing.sum() <= 3
     assert (ratio > 1 / 2).all()
@@ -86,7 +86,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
 @pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows[-1:]])
-    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    here = verify.run_checks(params, [plan.solver.options()], CARDAN, ("reference",))["reference"].results
     for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
         np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
     assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
@@ -100,7 +100,7 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     for name in ("newton", "settling"):
         assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows])
-    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
+    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), CARDAN, ("half_step",))["half_step"]
     assert fine.options["steps_per_rev"] == 180
     assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
 
@@ -145,12 +145,12 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
     other["F_max"][0, 2] += 0.02 * base["F_max"][0].max()
     other["T_max"][1] *= 1.25
     other["status"][2] = Status.NEWTON_FAILED
-    found = accuracy.differences(base, other)
+    found = accuracy.differences(base, other, CARDAN)
     assert found[0, 2] == pytest.approx(-0.02, rel=0.03)
     assert np.count_nonzero(found[0]) == 1
-    assert accuracy.by_kind(found)[1] == pytest.approx([0.2 if kind.key == "T" else 0 for kind in LOAD_KINDS])
+    assert accuracy.by_kind(found, CARDAN)[1] == pytest.approx([0.2 if kind.key == "T" else 0 for kind in LOAD_KINDS])
     assert np.isnan(found[2]).all()
-    assert accuracy.spread(accuracy.by_kind(found)[:, 1]) == pytest.approx((2, 0.1, 0.2, 0.2))
+    assert accuracy.spread(accuracy.by_kind(found, CARDAN)[:, 1]) == pytest.approx((2, 0.1, 0.2, 0.2))
     assert accuracy.spread(found[2])[0] == 0
 
 
@@ -246,7 +246,9 @@ def test_an_error_that_is_not_known_is_null_in_json(tmp_path):
     off_by(path, 1.25)
     with ResultFile.open(path) as store:
         view = store.view()
-        assert question.accuracy(view).frame("errors").equals(pd.DataFrame(question.error_rows(view.verification)))
+        assert (
+            question.accuracy(view).frame("errors").equals(pd.DataFrame(question.error_rows(view.verification, CARDAN)))
+        )
         view.numerical_error = {"F": math.nan, "T": 0.01}
         found = question.accuracy(view).values()
     assert json.loads(json.dumps(found, allow_nan=False))["facts"] == {"numerical_error": {"F": None, "T": 0.01}}
@@ -259,9 +261,9 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
         found = verification.read(store)
     assert found is not None
     found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
-    assert "1 not settled in reference" in question.error_note(found)
+    assert "1 not settled in reference" in question.error_note(found, CARDAN)
     # the estimate stands in: invented checks that change nothing
-    assert accuracy.by_kind(question.errors(found)[question.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
+    assert accuracy.by_kind(question.errors(found, CARDAN)[question.TOTAL], CARDAN)[:, 0] == pytest.approx([0.0, 0.2])
 
 
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
@@ -296,7 +298,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion
     np.testing.assert_allclose(seen, true, rtol=0.3)
     assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
-    assert "error of numerics and fidelity, measured" in question.error_note(found)
+    assert "error of numerics and fidelity, measured" in question.error_note(found, CARDAN)
     auto = study.load(written(tmp_path, REAL.replace("steps_per_rev = 12", 'fidelity = "auto"')))
     with pytest.raises(InputError, match="auto"):
         verify.check_study(auto)

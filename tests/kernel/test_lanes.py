@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import REFERENCE, joint_with_law, sliding
 from tests.support import kernel_states, trajectory
-from tests.support.of_cardan import PARAM, RESULT
+from tests.support.of_cardan import CARDAN, PARAM, RESULT
 from tolstat import joint as joints
 from tolstat import sampling, study
 from tolstat.common.tables import Fidelity, Method, Options, Start, Status, iterations_allowed
@@ -132,7 +132,7 @@ def mixed(cirelli):
         joint = joint_with_law(law)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
-        errors = joints.nominal_errors(n)
+        errors = joints.nominal_errors(n, CARDAN)
         for name in errors.dtype.names:
             if "offset" in name or "diameter" in name:
                 errors[name] = rng.normal(0, 2e-5, n)

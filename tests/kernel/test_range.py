@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.of_cardan import HOLES, PINS
+from tests.support.of_cardan import CARDAN, HOLES, PINS
 from tolstat import joint as joints
 from tolstat.common.tables import MAX_SHIFT, MAX_TILT
 from tolstat.joint import Operation
@@ -13,7 +13,7 @@ OPERATION = Operation.model_construct(alpha=0.2, speed=50.0, torque=100.0)
 
 
 def is_inside(joint, **errors):
-    table = joints.nominal_errors(1)
+    table = joints.nominal_errors(1, CARDAN)
     for name, value in errors.items():
         table[name.replace("__", ".")] = value
     return inside_model(joints.perturb(joint, OPERATION, table).view(np.recarray)[0])

@@ -12,11 +12,12 @@ import pytest
 
 SIMULATE = """
 import json, sys
+from tolstat.common.cardan import CARDAN
 from tolstat import joint
 from tolstat.common.tables import Options
 from tolstat.solver import simulation
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
-errors = joint.nominal_errors(1)
+errors = joint.nominal_errors(1, CARDAN)
 errors["pin1.offset_t"] = 2e-5
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, errors)
 coarse = Options(steps_per_rev=24, max_revs=2, max_refinements=0, peak_substeps=2)

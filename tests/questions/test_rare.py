@@ -123,7 +123,7 @@ def perturb(joint, operation, errors):
     return params
 
 
-def simulate(params, options, histories="none", n_harmonics=0):
+def simulate(params, options, **given):
     """A load that is linear in the errors; joints far on the other side fail."""
     results = np.zeros(len(params), tables(CARDAN).RESULT)
     results["status"] = np.where(params["R"] < FAILING, Status.NEWTON_FAILED, Status.OK)

@@ -10,6 +10,7 @@ from tests.solver.test_hard_cases import assert_honest
 from tests.support.environment import ROOT
 from tests.support.mechanisms import S
 from tolstat import joint, sampling, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.kernel.mechanics.scale import axial_decay, centring_stiffness
 from tolstat.kernel.revolution.trail import make_notes, note_closure, with_slow_decay
@@ -51,7 +52,7 @@ def test_reference_joints(name, settings):
     with np.load(REFERENCE / "mounting.npz") as file:
         largest = {load: file[f"{name}__{load}"] for load in "FT"}
     case = study.load_case(REFERENCE / f"{name[:9]}.toml")
-    errors = joint.nominal_errors(1)
+    errors = joint.nominal_errors(1, CARDAN)
     for key, value in case.errors.items():
         errors[key] = value
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)

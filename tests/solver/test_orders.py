@@ -10,6 +10,7 @@ from tests.support import naive
 from tests.support.closed_forms import pin_force
 from tests.support.mechanisms import lump_kind
 from tolstat import joint, sampling, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.joint import ideal
 from tolstat.joint.orders import Partner, add_partner
@@ -35,7 +36,7 @@ ORDERS = {
 def row_of(name):
     """The joint of a reference case."""
     case = study.load_case(REFERENCE / f"{name[:9]}.toml")
-    errors = joint.nominal_errors(1)
+    errors = joint.nominal_errors(1, CARDAN)
     for key, value in case.errors.items():
         errors[key] = value
     return joint.perturb(case.joint, case.operation, errors).view(np.recarray), case.solver.options()

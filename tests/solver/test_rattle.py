@@ -14,7 +14,7 @@ from tests.solver.test_refinement import assert_same
 from tests.support import exceedance
 from tests.support.environment import ROOT
 from tests.support.mechanisms import lump_kind
-from tests.support.of_cardan import PARAM, RESULT
+from tests.support.of_cardan import CARDAN, PARAM, RESULT
 from tolstat import joint, sampling, study
 from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import Sample
@@ -42,7 +42,7 @@ def joints(alpha: float, rpm: float, torque: float, rows: list[int]) -> np.ndarr
 def test_an_independent_solution() -> None:
     """Radau at rtol 1e-6 of another implementation, 7200 angles of the sixth revolution."""
     case = study.load_case(REFERENCE / "rattling" / "rattle_30.toml")
-    errors = joint.nominal_errors(1)
+    errors = joint.nominal_errors(1, CARDAN)
     for key, value in case.errors.items():
         errors[key] = value
     row = simulate_rows(joint.perturb(case.joint, case.operation, errors), Options()).results[0]

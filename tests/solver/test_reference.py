@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tests.support.mechanisms import N_DOF
-from tests.support.of_cardan import KIND, SPAN
+from tests.support.of_cardan import CARDAN, KIND, SPAN
 from tolstat import joint, study
 from tolstat.common.load_kinds import measure_of
 from tolstat.common.tables import Options, Status
@@ -19,7 +19,7 @@ OPTIONS = Options()
 
 def case(name):
     loaded = study.load_case(REFERENCE / f"{name}.toml")
-    errors = joint.nominal_errors(1)
+    errors = joint.nominal_errors(1, CARDAN)
     for key, value in loaded.errors.items():
         errors[key] = value
     return joint.perturb(loaded.joint, loaded.operation, errors)

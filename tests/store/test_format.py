@@ -147,7 +147,7 @@ def test_axes_of_histories_have_names(tmp_path: Path) -> None:
     )
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name, spec in specs.items():
-            layout.attach_scales(file.create_dataset(name, (2, *spec.shape), spec.dtype), spec)
+            layout.attach_scales(file.create_dataset(name, (2, *spec.shape), spec.dtype), spec, CARDAN)
         held = {name: file[name].asstr()[:].tolist() for name in layout.axes_of(CARDAN)}
         assert held == {name: list(names) for name, (names, _) in layout.axes_of(CARDAN).items()}
         np.testing.assert_allclose(file["theta"][:], np.radians(np.arange(0, 360, 10)))

@@ -64,11 +64,11 @@ def test_how_the_simulation_went_is_always_kept() -> None:
 def test_patterns_select_columns(tmp_path: Path) -> None:
     made = loaded(tmp_path, text("psi_max", "cross[12].F_max", "status"))
     names = {*COURSE, "cross1.F_max", "cross2.F_max", "psi_max"}
-    assert [c.name for c in made.output.columns] == [c.name for c in RESULT_COLUMNS if c.name in names]
+    assert [c.name for c in made.columns] == [c.name for c in RESULT_COLUMNS if c.name in names]
     assert made.identity()[KEPT] == ["cross1.F_max", "cross2.F_max", "psi_max"]
     assert made.asked == ["cross1.F", "cross2.F", "psi"]
     only_course = loaded(tmp_path, text("status"))
-    assert [c.name for c in only_course.output.columns] == COURSE
+    assert [c.name for c in only_course.columns] == COURSE
     assert only_course.asked == []
 
 
@@ -194,13 +194,13 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     with ResultFile.open(path) as store:
         held = verification.read(store)
     assert held is not None
-    table = pd.DataFrame(question.error_rows(held))  # from the file as from the run
-    pd.testing.assert_frame_equal(table, pd.DataFrame(question.error_rows(found)))
+    table = pd.DataFrame(question.error_rows(held, CARDAN))  # from the file as from the run
+    pd.testing.assert_frame_equal(table, pd.DataFrame(question.error_rows(found, CARDAN)))
     assert set(table["load"]) == {"F"}
     assert table["worst"].max() > 0
-    assert {row["load"] for row in question.joint_rows(held)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
-    assert question.error_note(held).count("F ") == 1
-    assert "T " not in question.error_note(held)
+    assert {row["load"] for row in question.joint_rows(held, CARDAN)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
+    assert question.error_note(held, CARDAN).count("F ") == 1
+    assert "T " not in question.error_note(held, CARDAN)
 
 
 def test_errors_are_relative_to_the_largest_load_kept() -> None:
@@ -209,13 +209,13 @@ def test_errors_are_relative_to_the_largest_load_kept() -> None:
     other["F_max"][0, 0] *= 1.01
     for results in (base, other):
         blank_others(results, columns(*CROSS_F))
-    found = accuracy.differences(base, other)
+    found = accuracy.differences(base, other, CARDAN)
     assert found[0, 0] == pytest.approx(-0.01 * base["F_max"][0, 0] / other["F_max"][0, :4].max())
     assert np.isfinite(found[:, :4]).all()
     assert np.isnan(found[:, 4:]).all()
-    assert np.isnan(accuracy.by_kind(found)[:, 1:]).all()
+    assert np.isnan(accuracy.by_kind(found, CARDAN)[:, 1:]).all()
     other["F_max"][1, 2] = np.nan  # of one joint: kept, not passed over
-    assert np.isnan(accuracy.by_kind(accuracy.differences(base, other))[1, 0])
+    assert np.isnan(accuracy.by_kind(accuracy.differences(base, other, CARDAN), CARDAN)[1, 0])
 
 
 def test_reports_show_what_there_is() -> None:

@@ -64,7 +64,7 @@ def test_only_loads_that_were_asked_for_and_the_first_errors_are_held(path, monk
         for field in LOAD_FIELDS:
             np.testing.assert_array_equal(part.results[field], whole[field])
         with pytest.raises(KeyError):
-            part.results["revolutions"]
+            part.results["no_column"]
         assert len(part._first_errors) == BLOCK
 
 

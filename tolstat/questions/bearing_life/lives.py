@@ -151,7 +151,7 @@ def lives_of(view: View) -> Lives:
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
         of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
-    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]
+    small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
     of_pins[unrated] = np.nan
     hours = np.column_stack([of_pins, rating_life.system_life(of_pins)])

@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests.support.environment import ROOT
-from tests.support.of_cardan import CARDAN, PARAM
+from tests.support.of_cardan import PARAM
 from tolstat import joint as joints
 from tolstat.campaign import pool
 from tolstat.cli import app
+from tolstat.common.cardan import CARDAN
 from tolstat.joint import orders
 from tolstat.store import metadata
 

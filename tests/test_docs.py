@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import tolstat
 from tests.support.environment import ROOT
 from tolstat import cli
 from tolstat.cli import LISTED
+from tolstat.common.cardan import SERIES
 from tolstat.questions import PUBLIC, QUESTIONS
 
 DOCS = ROOT / "docs"
@@ -151,7 +153,7 @@ def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str)
     study = tmp_path / "study.toml"
     sections = {"joint": 'base = "cirelli2021"', "sampling": "n = 8"}
     operation = '[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
-    written = blocks(DOCS / page, "toml")
+    written = [block for block in blocks(DOCS / page, "toml") if not block.startswith("[series]")]
     operation = "" if any(block.startswith("[[operation]]") for block in written) else operation
     own = [operation, *written, f"[{added}]\n{sections[added]}"]
     tables = [block for block in own if block.startswith("[tolerances]")]
@@ -161,6 +163,12 @@ def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str)
         study.write_text("\n".join([table, *rest]), encoding="utf-8")
         assert tolstat.load(study).sampling.n in (8, 1024)
     assert len(tables) >= (3 if page == "tolerances.md" else 1)
+
+
+def test_the_block_of_two_joints_makes_a_study() -> None:
+    (block,) = (block for block in blocks(DOCS / "study.md", "toml") if block.startswith("[series]"))
+    study = tomllib.loads((ROOT / "studies" / "series.toml").read_text(encoding="utf-8"))
+    assert tolstat.load(study | tomllib.loads(block)).mechanism == SERIES
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,7 @@ from tolstat.campaign import blocks as execution
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options
 from tolstat.display import progress
 from tolstat.solver import compilation, simulation
@@ -129,7 +130,7 @@ def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     assert heard[-1] == Counts(40, 40, 4, 4)
 
 
-def warm(calls: list[str], options: Options, params: np.ndarray) -> None:
+def warm(calls: list[str], options: Options, params: np.ndarray, mechanism: Mechanism) -> None:
     calls.append("warm")
 
 

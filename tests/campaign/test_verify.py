@@ -86,7 +86,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
 @pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows[-1:]])
-    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    here = verify.run_checks(params, [plan.solver.options()], CARDAN, ("reference",))["reference"].results
     for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
         np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
     assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
@@ -100,7 +100,7 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     for name in ("newton", "settling"):
         assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows])
-    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
+    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), CARDAN, ("half_step",))["half_step"]
     assert fine.options["steps_per_rev"] == 180
     assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
 

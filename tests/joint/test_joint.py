@@ -219,7 +219,7 @@ def test_nominal_joint(joint, operation):
 
 def test_masses_stiffness_and_markers_are_those_of_their_parts(joint, operation):
     """Along e, t and z of pin or arm, from the reference points of lump and base (docs/model.md, Bushings)."""
-    p = joints.perturb(joint, operation, joints.nominal_errors(1))[0]
+    p = joints.perturb(joint, operation, joints.nominal_errors(1, CARDAN))[0]
     R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
     for name, part, at in (("hub", joint.hub, 0.0), ("pin", joint.pin, R), ("arm", joint.arm, R)):
         kind = lump_kind(name)

@@ -56,7 +56,7 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
     plan, path = study.load(source), folder / "scale.h5"
     small: dict[str, Any] = {"workers": 1, "block": block}
     stand_in = {"simulate_rows": simulate, "history_specs": no_histories, "warm_up": fakes.warm_up}
-    fakes.replace_functions(pytest.MonkeyPatch(), **stand_in, is_compiled=lambda *_: False)
+    fakes.replace_functions(pytest.MonkeyPatch(), **stand_in, is_compiled=lambda *_, **__: False)
     campaign.run(study.load(source, n=1000), folder / "first.h5", **small)  # what the code itself takes
     (folder / "first.h5").unlink()
     before, times = peak_bytes(), [time.perf_counter()]

@@ -8,6 +8,7 @@ import pytest
 from studies.precision.measuring import Times, choose, in_turn, parameters
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
+from tolstat.common.cardan import CARDAN
 
 STUDIES = ROOT / "studies"
 
@@ -36,7 +37,7 @@ def test_chosen_joints_are_nominal_and_random_ones_then_a_block():
     base = study.load(STUDIES / "rigid_shafts.toml")
     params, count = choose(base, 6, 4, 64)
     assert (len(params), count) == (64, 7)
-    nominal = joint.perturb(base.joint, base.operation, joint.nominal_errors(1))
+    nominal = joint.perturb(base.joint, base.operation, joint.nominal_errors(1, CARDAN))
     assert params[:1].tobytes() == nominal.tobytes()
     assert len(np.unique(params["pin_axis"], axis=0)) == len(params)
     few, count = choose(base, 6, 4, 1)

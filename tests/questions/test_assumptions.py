@@ -68,7 +68,7 @@ PLACE = "r_b 30 mm"
 NAMES = ["shaft slides", "arm length (l_f 30 mm)", "arm length (l_f 45 mm)", PLACE]
 
 
-def stand_in(params, options, histories="none", n_harmonics=0, slides=0.0, arm=0.0):
+def stand_in(params, options, slides=0.0, arm=0.0, **given):
     """Loads at 100 N m from an offset, 40 N a sigma above 640 N; `slides` N where the shaft does, `arm` N a mm."""
     results = np.zeros(len(params), tables(CARDAN).RESULT)
     offset = params["pin_point"][:, 1, 2] / 5e-5

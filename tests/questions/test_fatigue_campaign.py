@@ -14,6 +14,7 @@ import tolstat
 from tests.questions.test_fatigue import needs
 from tests.support import synthetic
 from tests.support.environment import ROOT
+from tests.support.of_cardan import BUSHING_LOADS, COMPONENTS
 from tests.support.reports import call
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.cardan import CARDAN
@@ -25,7 +26,7 @@ from tolstat.display.blocks import Panels
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
 from tolstat.questions.fatigue.counting import of_slots
-from tolstat.questions.fatigue.loads import SHOWN, channels, pylife_frame
+from tolstat.questions.fatigue.loads import channels, pylife_frame
 from tolstat.solver import histories
 from tolstat.store import ResultFile
 from tolstat.study import load
@@ -55,6 +56,7 @@ line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
 """
 )
 LINE = Line(5.0, 1000.0, 2e6)
+SHOWN = tuple(signal.name for signal in COMPONENTS.values() if signal.history == BUSHING_LOADS)
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -183,7 +184,7 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
         ("a", "b"), size[..., None], 0.0 * size[..., None], np.where(np.isnan(size), size, 1.0)
     )
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    joints = Joints(state, Independent(), settings, n, (("", 1.0),))
+    joints = Joints(state, Independent(), settings, CARDAN, n, (("", 1.0),))
     return Counted(**vars(joints), cycles=cycles, nominal=cycles.rows(slice(0)), apart=0.0), size, line
 
 
@@ -250,7 +251,9 @@ def bent(monkeypatch, moments, force=0.0, number=0):
     monkeypatch.setattr(counting.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
     settings = of_text(ROUND, "a.toml")
     settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
-    found, _ = counting.of_slots(None, np.arange(1), parts.stresses_at(settings.points, CARDAN), kept=180)
+    found, _ = counting.of_slots(
+        SimpleNamespace(mechanism=CARDAN), np.arange(1), parts.stresses_at(settings.points, CARDAN), kept=180
+    )
     return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
 
 

@@ -187,7 +187,7 @@ def test_no_other_fit_interferes_at_any_size(tmp_path):
             if zones.least < 0.0:
                 continue
             scatter = {"basic": f"{size} mm", "code": code, "distribution": "uniform"}
-            for other in widths.other_fits(fits.of(scatter, "study")):
+            for other in widths.other_fits(fits.of(scatter, "study", CARDAN)):
                 assert iso.zones(iso.parse(other), size).least >= 0.0
 
 
@@ -229,7 +229,7 @@ def test_loads_with_another_fit_are_those_of_the_study_with_that_fit(tmp_path, m
         assert found.valid([name]).tobytes() == loads_of(CARDAN)[name].of(results).tobytes()
 
 
-def by_clearance(params, options, histories="none", n_harmonics=0):
+def by_clearance(params, options, **given):
     """Loads of the stand-in that fall with the clearance: 40 N less for 10 um."""
     found = stand_in(params, options)
     found.results["F_max"] -= (4e6 * (params["clearance"].mean(axis=1) - 35e-6))[:, None]

@@ -123,7 +123,7 @@ def perturb(joint, operation, errors):
     return params
 
 
-def simulate(params, options, histories="none", n_harmonics=0):
+def simulate(params, options, **given):
     """A load that is linear in the errors; joints far on the other side fail."""
     results = np.zeros(len(params), tables(CARDAN).RESULT)
     results["status"] = np.where(params["R"] < FAILING, Status.NEWTON_FAILED, Status.OK)
@@ -354,7 +354,7 @@ def test_limits_by_pattern_and_all_limits_together(tmp_path, monkeypatch):
     monkeypatch.setattr(simulation, "run", lambda own, *_: plans.append(own))
     for words in ("cross*.F > 950 N", "any limit"):
         module.simulate(plan, Work(tell=lambda text: None), words, 100, 0.5, repeats=1)
-    several, every = (own.sampling.limit for own in plans)
+    several, every = (own.sampling.limit(CARDAN) for own in plans)
     assert several.loads == ("cross1.F", "cross2.F", "cross3.F", "cross4.F")
     assert dict(zip(every.loads, every.levels, strict=True)) == plan.limits
 

@@ -73,7 +73,7 @@ def test_damage_of_a_sequence_is_that_of_the_histories_one_after_the_other(seed)
     shares = number * turns[used] / total
     duty = tuple((f"p{p}", share) for p, share in zip(used, shares, strict=True))
     settings = Fatigue(visits=tuple(f"p{p}" for p in visits), turns=total)
-    joints = Joints(np.full(1, Status.OK), Independent(), settings, 1, duty)
+    joints = Joints(np.full(1, Status.OK), Independent(), settings, CARDAN, 1, duty)
     parts = [of_loads(points[p], signals) for p in used]
     low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
     mixed = cycles.duty_cycle(parts, shares, joints.transitions(low, high))
@@ -95,7 +95,7 @@ def test_a_duty_cycle_with_a_sequence_adds_its_cycles():
     waves = [np.array([0.0, 1.0]), np.array([10.0, 11.0, 10.5, 10.7])]
     parts = [of_signals(wave, wave) for wave in waves]
     settings = Fatigue(visits=("a", "b", "a", "b"), turns=100.0)
-    joints = Joints(np.full(2, Status.OK), Independent(), settings, 2, (("a", 0.5), ("b", 0.5)))
+    joints = Joints(np.full(2, Status.OK), Independent(), settings, CARDAN, 2, (("a", 0.5), ("b", 0.5)))
 
     def mixed(parts):
         low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))

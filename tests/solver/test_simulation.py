@@ -370,8 +370,9 @@ def test_other_laws_share_the_statics(params, law):
 PROBE = """
 import numpy as np
 from tolstat import joint
+from tolstat.common.cardan import CARDAN
+from tolstat.common.tables import Options, tables
 from tolstat.solver import simulation
-from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, joint.nominal_errors(1, CARDAN))
 par = par.view(np.recarray)
@@ -394,7 +395,7 @@ def test_nothing_is_allocated_per_step():
     code = """
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
-out = np.zeros(1, RESULT).view(np.recarray)
+out = np.zeros(1, tables(CARDAN).RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
     options = Options(max_revs=revolutions, settle_tol=1e-12)

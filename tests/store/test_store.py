@@ -214,6 +214,17 @@ def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dic
             opened(path)
 
 
+def test_a_file_of_an_unknown_mechanism_is_refused(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    new_store(path, study).close()
+    with h5py.File(path, "r+") as file:
+        metadata.write(file, metadata.read(file).model_copy(update={"mechanism": "chain"}))
+    message = "has mechanism 'chain', this tolstat reads cardan and series\n  hint: use a newer tolstat"
+    for opened in (ResultFile.open, Writer.open):
+        with pytest.raises(StoreError, match=message):
+            opened(path)
+
+
 def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
     plain = tmp_path / "text.h5"
     plain.write_text("not HDF5")

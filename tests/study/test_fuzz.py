@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tests.support import synthetic
 from tolstat import joint, study
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.study import costs, scaling
 from tolstat.study.file import SECTIONS as OF_STUDY
@@ -184,7 +185,7 @@ def test_costs_are_read_or_refused(tmp_path: Path, rows: list[list[str]], kind: 
         lines += [",".join([key, *(str(entry.get(name, "")) for name in names)]) for key, entry in table.items()]
     path.write_text("\n".join(lines), encoding="utf-8", errors="ignore", newline="")
     try:
-        read = costs.of(tolerances, path)
+        read = costs.of(tolerances, CARDAN, path)
     except InputError as error:
         check(error)
     else:
@@ -197,7 +198,7 @@ def test_costs_beyond_all_numbers_are_refused(tmp_path: Path, entry: str) -> Non
     (tmp_path / "a.toml").write_text(synthetic.STUDY, encoding="utf-8")
     (tmp_path / "costs.toml").write_text(f'"pin*.offset_t" = {entry}', encoding="utf-8")
     with pytest.raises(InputError, match="costs more than a number can hold") as raised:
-        costs.of(scaling.tolerances(study.load(tmp_path / "a.toml")), tmp_path / "costs.toml")
+        costs.of(scaling.tolerances(study.load(tmp_path / "a.toml")), CARDAN, tmp_path / "costs.toml")
     check(raised.value)
 
 

@@ -24,7 +24,7 @@ class FakeStore(Reader):
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
         self.path, self.study_name, self.study_text = Path("made_up.h5"), "made up", study_text
         self.sampling = {"method": method, "nominal_first": True, "n": len(errors) - 1}
-        self.mechanism, self.limits, self.columns = CARDAN, limits, columns
+        self.limits, self.columns, self.mechanism = limits, columns, CARDAN
         self.variants, self.joint, self.identity = (), joint, {}
         self.options = Options()._asdict()
         self._errors, self._results = errors, results if isinstance(results, dict) else {"": results}

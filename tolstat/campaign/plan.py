@@ -18,8 +18,10 @@ from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import verify
 from tolstat.campaign.block import spread
 from tolstat.campaign.run import choose_fidelity
+from tolstat.common.cardan import CARDAN
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
@@ -83,7 +85,7 @@ class LimitPlan:
 
 @dataclass(frozen=True)
 class Reversals:
-    """Joints of the pilot whose torque reverses, so that they rattle: see `ideal.reversal_torque`.
+    """Joints of the pilot whose torque reverses, so that they rattle, see `ideal.reversal_torque`; in series none.
 
     Attributes
     ----------
@@ -256,7 +258,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
-        reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()])),
+        reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()]), study.mechanism),
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
         sweep=design.meaning(study.sweep, study.joint),
@@ -321,7 +323,9 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     return time.process_time() - begin
 
 
-def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:
+def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:
+    if mechanism != CARDAN:
+        return Reversals(0, None, None)
     torque = ideal.reversal_torque(params)
     here = np.abs(params["torque"]) < torque
     if not here.any():

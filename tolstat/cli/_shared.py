@@ -262,9 +262,8 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     for note in study.signals:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
-    if note := points.note_on_shafts(
-        study.tolerances, axial, points.with_free_shaft(str(path), path.stem, study.joint)
-    ):
+    command = points.with_free_shaft(str(path), path.stem, study.joint, study.mechanism)
+    if note := points.note_on_shafts(study.tolerances, axial, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):

@@ -4,7 +4,9 @@ The hub carries pins 1 to 4; pin 1 turns in the hole of arm 4, pin 2 in arm 3, p
 and 2 belong to the input fork, 3 and 4 to the output fork. `kernel.mechanics.cardan` counts on the order of the parts.
 """
 
-from functools import cache
+from collections.abc import Collection
+from itertools import combinations
+from typing import Any
 
 from tolstat.common.mechanism import (
     CLOSED_FORM,
@@ -73,7 +75,7 @@ def series(number: int) -> Mechanism:
         )
         joints.append(joint("", f"joint{i}.", *ends))
     parts = ("members", "lumps", "shafts", "bushings", "hinges", "pairs", "unknowns", "cardan")
-    together = {part: sum((getattr(one, part) for one in joints), ()) for part in parts}
+    together: dict[str, Any] = {part: sum((getattr(one, part) for one in joints), ()) for part in parts}
     return Mechanism("series", **together)
 
 
@@ -84,24 +86,27 @@ PARTS = ("thrust", "friction", "input_bearings", "output_bearings")
 its first and its last shaft."""
 
 
-@cache
-def extended(name: str) -> Mechanism:
-    """Return a mechanism by its name: ``cardan``, or with some of `PARTS`, in their order, ``cardan+thrust+friction``.
+def named(base: Mechanism, parts: Collection[str]) -> str:
+    """Name in `MECHANISMS` of a mechanism with some of `PARTS`: ``cardan+thrust+friction``."""
+    return "+".join((base.name, *(part for part in PARTS if part in parts)))
 
-    Raises
-    ------
-    KeyError
-        When there is none.
-    """
-    base, *parts = name.split("+")
-    mechanism = {one.name: one for one in (CARDAN, SERIES)}[base]
-    if parts != [part for part in PARTS if part in parts]:
-        raise KeyError(name)
-    pins = [pair.pin for pair in mechanism.pairs] if "thrust" in parts else []
-    ends = {mechanism.shafts[i].name for i, end in ((0, "input"), (-1, "output")) if f"{end}_bearings" in parts}
-    return mechanism._replace(
-        name=name,
-        shafts=tuple(shaft._replace(borne=shaft.name in ends) for shaft in mechanism.shafts),
+
+def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
+    ends = {base.shafts[i].name for i, end in ((0, "input"), (-1, "output")) if f"{end}_bearings" in parts}
+    pins = [pair.pin for pair in base.pairs] if "thrust" in parts else []
+    return base._replace(
+        name=named(base, parts),
+        shafts=tuple(shaft._replace(borne=shaft.name in ends) for shaft in base.shafts),
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
     )
+
+
+MECHANISMS = {
+    mechanism.name: mechanism
+    for base in (CARDAN, SERIES)
+    for n in range(len(PARTS) + 1)
+    for parts in combinations(PARTS, n)
+    for mechanism in [_with(base, parts)]
+}
+"""Mechanisms by name."""

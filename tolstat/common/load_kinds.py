@@ -210,10 +210,10 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
             f"amplitude of the {noun} at multiples of the input speed, in axes that do not turn, of any revolution"
         )
         key, noun = f"{symbol}_orders", f"amplitude of the {noun}"
-        found.append(
-            Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, of_revolution=True, measure=measure)
-        )
-    found.append(Kind("loss", "loss", "loss", "W", _LOSS, (*pins, "") if mechanism.friction else (), of_revolution=True))
+        found.append(Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, of_revolution=True, measure=measure))
+    found.append(
+        Kind("loss", "loss", "loss", "W", _LOSS, (*pins, "") if mechanism.friction else (), of_revolution=True)
+    )
     return {kind.key: kind for kind in found}
 
 
@@ -241,9 +241,9 @@ def load_numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
     Returns
     -------
     dict of str to ndarray of int
-        ``begin``: (kinds,) first element of each of `all_kinds`. ``modulus``, ``interpolated``: (n,) of each load at one instant,
-        whether kernels write its square, and whether a largest value between samples is interpolated. ``measured``:
-        (measures, 2) first and last + 1 of the loads that changes are relative to, forces and torques. ``deciding``:
+        ``begin``: (kinds,) first element of each of `all_kinds`. ``modulus``, ``interpolated``: (n,) of each load at
+        one instant, whether kernels write its square, and whether a largest value between samples is interpolated.
+        ``measured``: (measures, 2) first and last + 1 of the loads that changes are relative to. ``deciding``:
         loads that decide on settling, closer look and steps; those compared with measure m are number
         ``of_measure[m, 0]`` to ``of_measure[m, 1]`` - 1 of them, first those that measure. ``others``: those at one
         instant that do not decide.

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tolstat.joint.perturbation import Operation as Operation
     from tolstat.joint.perturbation import OperationInSeries as OperationInSeries
     from tolstat.joint.perturbation import Series as Series
+    from tolstat.joint.perturbation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
@@ -26,7 +27,10 @@ if TYPE_CHECKING:
 _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
-    "perturbation": ("MEANS", "Operation", "OperationInSeries", "Series", "nominal_errors", "operating", "perturb"),
+    "perturbation": (
+        *("MEANS", "Operation", "OperationInSeries", "Series"),
+        *("mechanism_of", "nominal_errors", "operating", "perturb"),
+    ),
     "reading": ("load", "varied"),
 }
 

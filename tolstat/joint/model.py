@@ -182,14 +182,9 @@ class Joint(Strict):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """What the joint has beside lumps, bushings and pairs: some of `cardan.PARTS`."""
-        has = {
-            "thrust": self.thrust is not None,
-            "friction": self.friction.mu is not None,
-            "input_bearings": self.shaft.input is not None,
-            "output_bearings": self.shaft.output is not None,
-        }
-        return tuple(part for part in PARTS if has[part])
+        """What the joint has beside lumps, bushings and pairs, `cardan.PARTS`."""
+        of = (self.thrust, self.friction.mu, self.shaft.input, self.shaft.output)
+        return tuple(part for part, given in zip(PARTS, of, strict=True) if given is not None)
 
     @property
     def k_cross(self) -> Array:

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, PIN_QUARTERS, SERIES, extended
+from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, SERIES, named
 from tolstat.common.loads import split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import MAX_STATIONS
@@ -66,6 +66,11 @@ class Operation(Strict):
 
     _split = model_validator(mode="before")(orders.split)
 
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """Misalignment of each joint (rad)."""
+        return (self.alpha,)
+
     @model_validator(mode="after")
     def _check_torsion(self) -> Operation:
         if self.partner is not None:
@@ -86,7 +91,7 @@ class Series(Strict):
 
     alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
     """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
-    angle: units.Angle = Field(default=np.pi, examples=["0 deg"])
+    angle: units.Angle = Field(default=np.pi, json_schema_extra={"default": "180 deg"}, examples=["0 deg"])
     """angle of the plane of joint 2 ahead of that of joint 1, about the tube; at 180 deg, the default, the outer shafts
     of joints of equal misalignment are parallel, at 0 deg both joints bend the same way"""
     offset: units.Angle = Field(default=0.0, examples=["5 deg"])
@@ -109,6 +114,12 @@ class OperationInSeries(Operation):
     series: Series
     """joint 2 and the tube"""
 
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """See `Operation.alphas`."""
+        return self.alpha, self.series.alpha
+
+
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
 
@@ -116,7 +127,7 @@ MEANS = ("alpha", "speed", "torque", "axial_force")
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
     """What is simulated: a joint, or joints in series, with the parts that the joint has."""
     base = SERIES if isinstance(operation, OperationInSeries) else CARDAN
-    return extended("+".join((base.name, *joint.parts)))
+    return MECHANISMS[named(base, joint.parts)]
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -196,12 +207,12 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
         deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"])
         params["clearance"][:, i] = _clearance(joint.contact, *deviations)
-    half = 0.5 * joint.contact.z
-    for i, face in enumerate(mechanism.faces):
-        prefix = face.name.rpartition(".")[0]
-        play = joint.thrust.end_play + errors[f"{prefix}{'.' if prefix else ''}thrust.end_play"]
-        params["face_at"][:, i, 0], params["face_at"][:, i, 1] = half, half + 0.5 * play
-    if mechanism.friction:
+    if joint.thrust is not None:
+        half = 0.5 * joint.contact.z
+        for i, face in enumerate(mechanism.faces):
+            play = joint.thrust.end_play + errors[f"{face.name.removesuffix(face.name[-1])}.end_play"]
+            params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+    if joint.friction.mu is not None:
         params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params
 

@@ -97,6 +97,9 @@ class Reader:
 
     def _describe(self, document: metadata.Metadata) -> None:
         self.metadata = document
+        if document.mechanism not in MECHANISMS:
+            found = f"has mechanism {document.mechanism!r}, which this tolstat does not know"
+            raise store_error(self.path, found, "use a newer tolstat")
         self.mechanism = MECHANISMS[document.mechanism]
         self.study_name, self.study_text = document.study_name, document.study
         self.joint, self.limits = document.joint, document.limits

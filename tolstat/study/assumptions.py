@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.joint import derived
@@ -75,10 +76,12 @@ def _process(key: str) -> str:
 def given(study: Study) -> tuple[str, ...]:
     """Names of the assumptions of the joint file that the study gives: its ``[joint]`` or fit sets one of their keys.
 
-    A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
+    A key that follows from one that the study sets is given, too: it no longer has the value of the joint file. In
+    series so is ``shaft.axial``, since the shafts are held.
     """
     replaced = {entry.name for entry in study.assumed}
-    keys = derived.changed(leaves(_keys_of_study(study)).keys(), leaves(study.joint.given("json")))
+    of_study = {*leaves(_keys_of_study(study)), *(() if study.mechanism == CARDAN else ("shaft.axial",))}
+    keys = derived.changed(of_study, leaves(study.joint.given("json")))
     return tuple(
         entry.name
         for entry in study.joint.assumed
@@ -248,7 +251,7 @@ def _wide_bands(study: Study) -> Iterator[Fault]:
 def _fast_points(study: Study) -> Iterator[Fault]:
     """Operating points whose speed is far beyond that of any joint shaft at their misalignment."""
     for number, point in enumerate(study.points):
-        rpm, alpha = point.operation.speed * 30.0 / math.pi, math.degrees(point.operation.alpha)
+        rpm, alpha = point.operation.speed * 30.0 / math.pi, math.degrees(max(point.operation.alphas))
         product = abs(rpm) * alpha
         if product > FAST * (1.0 + ROUNDING):
             at = f" at {point.name}" if point.name else ""

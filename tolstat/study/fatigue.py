@@ -32,13 +32,20 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
+def _check_bushing(bushing: str, info: ValidationInfo) -> str:
+    places = kinds_of((info.context or {})["mechanism"])["F"].places
+    if not select(bushing, places):
+        raise refuse(f"{bushing!r} is not a bushing", did_you_mean(bushing, places))
+    return bushing
+
+
 class StressPointEntry(Strict):
     """Point of a part: its stress is a sum of the bushing's load components, each times a factor.
 
     A round section has no one point where bending about two axes is largest: it is evaluated all around.
     """
 
-    bushing: str = Field(examples=["fork*"])
+    bushing: Annotated[str, AfterValidator(_check_bushing)] = Field(examples=["fork*"])
     """bushing whose load stresses the point, or pattern of several"""
     F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
     """stress at the point by the force along e of the bushing"""
@@ -282,7 +289,7 @@ def read(file: Reading) -> Fatigue:
     lines: dict[str, tuple[float, float, float]] = {}
     claims, names = Assignments(file.place, file.mechanism), [point.name for point in file.points or ()]
     with gather(file.faults):
-        settings = file.model(Settings, table, "fatigue")
+        settings = file.model(Settings, table, "fatigue", mechanism=file.mechanism)
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
         file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
@@ -302,11 +309,7 @@ def read(file: Reading) -> Fatigue:
             lines |= dict.fromkeys(selected, (line.m, value, line.N0))
     points = []
     for name, point in settings.point.items():
-        places = kinds_of(file.mechanism)["F"].places
-        bushings = select(point.bushing, places)
-        if not bushings:
-            remedy = did_you_mean(point.bushing, places)
-            file.fault(("fatigue", "point", name, "bushing"), f"{point.bushing!r} is not a bushing", remedy)
+        bushings = select(point.bushing, kinds_of(file.mechanism)["F"].places)
         for bushing in bushings:
             own = name if len(bushings) == 1 else f"{name}, {bushing}"
             points.append(StressPoint(own, bushing, point.per_load, point.line))

@@ -15,7 +15,9 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field
 
 from tolstat.common import loads, units
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import Joint, Operation, OperationInSeries, Series, orders
@@ -276,9 +278,10 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     tuple
         Key path, what was found, remedy.
     """
+    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        remedy = "remove it" if in_series else 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
     for key in ("speed", "torque"):
@@ -288,7 +291,6 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
-    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
     for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
         found = "stands beside [series]: both joints are simulated, none stands for the other"
         yield path, found, "remove it, or [series]"
@@ -300,8 +302,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
 
 
-def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
-    """Command that runs a study with an output shaft that is free along its axis.
+def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:
+    """Command that runs a study with an output shaft that is free along its axis; empty where it cannot be.
 
     Parameters
     ----------
@@ -309,7 +311,11 @@ def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
         Study file, and its name without ending.
     joint : Joint
         The study's joint; what a free shaft needs and it lacks is in the command, too.
+    mechanism : Mechanism
+        What is simulated: shafts of joints in series are held.
     """
+    if mechanism != CARDAN:
+        return ""
     needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
     lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
     settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
@@ -326,7 +332,7 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
     axial : iterable of float or str
         ``shaft.axial`` of each variant.
     command : str
-        The command.
+        The command; empty if there is none.
 
     Returns
     -------
@@ -336,8 +342,8 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
     if not along or any(value != RIGID for value in axial):
         return ""
-    return (
+    note = (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        "them: some loads are larger than with a spline.\n"
-        f"With a free output shaft: {command}"
+        "them: some loads are larger than with a spline."
     )
+    return f"{note}\nWith a free output shaft: {command}" if command else note

@@ -32,7 +32,7 @@ from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
-from tolstat.study.selection import error_units, given_units, halves, toleranced_units
+from tolstat.study.selection import error_units, given_units, halves, joints, toleranced_units
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES
@@ -45,6 +45,8 @@ WILD = r"[^.]*[*?\[][^.]*"
 """Half of a name with a wildcard."""
 FEATURE = rf"(?:[^.]*\.)?{WILD}|{WILD}\.[^.]*"
 """What stands before the last dot of a name, with a wildcard; a joint may stand before it."""
+JOINTS = {joint for mechanism in MECHANISMS.values() for joint in joints(mechanism)}
+"""What stands before the names of the features of one of several joints."""
 REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
 
@@ -111,7 +113,7 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
     features: dict[str, dict[str, Schema]] = {}
     names_of: dict[str, list[str]] = {}
     for name, schema in entries.items():
-        feature, half = halves(name)
+        feature, half = halves(name) if name.partition(".")[0] in JOINTS else name.partition(".")[::2]
         features.setdefault(feature, {})[half] = schema
         names_of.setdefault(json.dumps(schema), []).append(name)
     wild = {"anyOf": _different(schema for name, schema in entries.items() if not is_zone(name))}
@@ -144,7 +146,8 @@ def _keys(names: Iterable[str]) -> str:
     features_of: dict[str, list[str]] = {}
     for feature, keys in halves_of.items():
         features_of.setdefault("|".join(keys), []).append(re.escape(feature))
-    return "|".join(f"(?:{'|'.join(features)}|{FEATURE})(?:{ends})" for ends, features in features_of.items())
+    wild = {ends: FEATURE if ends else WILD for ends in features_of}
+    return "|".join(f"(?:{'|'.join(features)}|{wild[ends]})(?:{ends})" for ends, features in features_of.items())
 
 
 def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:

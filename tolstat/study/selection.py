@@ -168,15 +168,28 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
 
 def suggestion(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
-    feature, key = halves(pattern)
+    if remedy := without_joint(pattern, names):
+        return remedy
     every = list(dict.fromkeys(halves(name)[0] for name in names))
+    feature, key = (pattern, "") if pattern in every else halves(pattern)
     known = [name for name in every if _matches(feature, name)]
     if not known:
-        joint = next((name.rpartition(".")[0] for name in every if _matches(feature, own(name))), "")
-        if joint:
-            return f"write the joint before it: {joint}.{pattern}, or {alike(joint)}.{pattern} for all joints"
+        rest = pattern.partition(".")[2]
+        if rest in every or select(rest, names):
+            return f"did you mean {rest!r}?"
         return did_you_mean(feature, every)
     return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]])
+
+
+def without_joint(pattern: str, names: Sequence[str]) -> str:
+    """Remedy for a pattern that lacks the joint before it; empty for others."""
+    feature = halves(pattern)[0]
+    of_joints = [name for name in names if "." in halves(name)[0]]
+    found = select(f"*.{pattern}", of_joints) or [name for name in of_joints if _matches(feature, own(halves(name)[0]))]
+    if not found:
+        return ""
+    joint = found[0].partition(".")[0]
+    return f"write the joint before it: {joint}.{pattern}, or {alike(joint)}.{pattern} for all joints"
 
 
 class Assignments:

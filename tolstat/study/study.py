@@ -19,7 +19,7 @@ from tolstat.common.loads import limits_in_words, loads_of, split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
-from tolstat.joint import Joint, Operation, affecting_results
+from tolstat.joint import Joint, Operation, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
 from tolstat.study import points
@@ -114,7 +114,7 @@ class Study:
     @property
     def mechanism(self) -> Mechanism:
         """What is simulated: a Cardan joint, or joints in series."""
-        return self.operation.mechanism
+        return mechanism_of(self.joint, self.operation)
 
     @property
     def columns(self) -> tuple[Column, ...]:

@@ -3,6 +3,8 @@
 A record of one joint, of width 1, is read as plain numbers.
 """
 
+from types import MappingProxyType
+
 import numpy as np
 from numba import typeof
 from numba.core import types
@@ -23,7 +25,7 @@ class LaneRecord(types.Record):
     The numbers of the mechanism are `constants` of the code, which loops over its parts are unrolled with.
     """
 
-    constants: dict[str, np.ndarray] = {}
+    constants = MappingProxyType({})
 
     @property
     def dtype(self):

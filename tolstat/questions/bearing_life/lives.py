@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -55,10 +55,10 @@ class Lives:
     nominal_loads, nominal_hours : ndarray, shape (pins,) and (pins + 1,)
         The same of the nominal joint; NaN if there is none.
     short, fretting : dict of str to int
-        Valid joints by operating point that swing by less than ``bearing.critical_amplitude`` there, and by less than
-        `rating_life.FRETTING` times this; only points that have any.
+        Valid joints by operating point of which a bearing swings by less than ``bearing.critical_amplitude`` there, and
+        by less than `rating_life.FRETTING` times this; only points that have any.
     unrated : int
-        Valid joints without a rating: fretting is to be expected at each of their operating points.
+        Valid joints without a rating: a bearing swings by less than the latter at each of their operating points.
     load_error : float
         Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
     """
@@ -80,6 +80,11 @@ class Lives:
     def places(self) -> tuple[str, ...]:
         """Pins, and `JOINT`."""
         return (*self.pins, JOINT)
+
+    @property
+    def in_series(self) -> bool:
+        """Whether the bearings are of several joints, which swing by different angles."""
+        return len(self.view.mechanism.cardan) > 1
 
     @property
     def valid(self) -> int:
@@ -130,24 +135,30 @@ def lives_of(view: View) -> Lives:
     pins = kinds(view.mechanism)["contact"].places
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
     operation = [recorded.operating_points(store) for store in stores]
-    swings, speeds = (np.abs([rows[name] for rows in operation]) for name in ("alpha", "speed"))  # (points, rows)
+    speeds = np.abs([rows["speed"] for rows in operation])[:, :, None]
+    swings = np.abs(
+        [
+            _misalignments(rows["alpha"], store.operation.alphas[1:], len(pins))
+            for rows, store in zip(operation, stores, strict=True)
+        ]
+    )  # (points, rows, pins)
     critical = bearing.critical_amplitude
-    hourly = duty[:, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
+    hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
+        turned = np.where(turns > 0.0, hourly / turns, duty[:, None, None])
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([of_pins, rating_life.system_life(of_pins)])
-    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]
+        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
+    small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
-    hours[unrated] = np.nan
+    of_pins[unrated] = np.nan
+    hours = np.column_stack([of_pins, rating_life.system_life(of_pins)])
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
-        {name: int(n) for name, n in zip(view.points, (joints[:, skip:] & valid).sum(axis=1), strict=True) if n}
-        for joints in small
+        {name: int(n) for name, n in zip(view.points, (some[:, skip:] & valid).sum(axis=1), strict=True) if n}
+        for some in (np.asarray(joints.any(axis=2)) for joints in small)
     )
     return Lives(
         view=view,
@@ -160,9 +171,15 @@ def lives_of(view: View) -> Lives:
         nominal_hours=hours[0] if has_nominal else np.full(len(pins) + 1, np.nan),
         short=short,
         fretting=fretting,
-        unrated=int((unrated[skip:] & valid).sum()),
+        unrated=int((unrated[skip:].any(axis=1) & valid).sum()),
         load_error=_load_error(view),
     )
+
+
+def _misalignments(first: FloatArray, others: Sequence[float], pins: int) -> FloatArray:
+    """Misalignment of the joint that each pin is of, (rows, pins), rad: of the first joint (rows,), and of others."""
+    joints = np.column_stack([first, *(np.full(len(first), alpha) for alpha in others)])
+    return np.asarray(np.repeat(joints, pins // joints.shape[1], axis=1))
 
 
 def bearing_of(view: View) -> Bearing | None:

@@ -18,7 +18,6 @@ from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED, tables
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Row, Rows, Sentence
-from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.drawings import views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
@@ -80,18 +79,12 @@ def _joints(view: View, marked: Collection[str], load: str) -> dict[str, tuple[P
     By what stands before the names of its parts, see `views.joints_in`.
     """
     point, joint = view.point_of(load) if load else view.points[0], recorded.joint_of(view.store, 0)
-    alphas, drawn = _misalignments(joint, view.at(point).store.operation), {}
+    alphas, drawn = view.at(point).store.operation.alphas, {}
     for before, alpha in zip(views.joints_in(tables(view.mechanism).ERROR), alphas, strict=True):
         own = [name.removeprefix(before) for name in marked if name.startswith(before)]
         front, side = _named(views.views(joint, alpha, own), before)
         drawn[before] = front, replace(side, title=f"{side.title}, at {point}") if point else side
     return drawn
-
-
-def _misalignments(joint: joints.Joint, operation: joints.Operation) -> list[float]:
-    """Misalignment of each Cardan joint, rad."""
-    angles: list[float] = perturb(joint, operation, nominal_errors(1, operation.mechanism))["alpha"][0].tolist()
-    return angles
 
 
 def _named(panels: tuple[Panel, Panel], before: str) -> list[Panel]:
@@ -192,7 +185,7 @@ def read(
                 raise InputError([Fault(str(path), holds, remedy)])
             first, slot, title = store.each()[0], 0 if row is None else store.slot(row), store.study_name
             joint = recorded.joint_of(store, slot)
-            alphas = _misalignments(joint, recorded.operation_of(first, slot))
+            alphas = list(recorded.operation_of(first, slot).alphas)
             if row is None:
                 point = first.point or ""
             else:
@@ -202,7 +195,7 @@ def read(
     elif path.suffix == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
         case = study.load(path) if "sampling" in data else study.load_case(path)
         joint, title = case.joint, path.stem
-        alphas = _misalignments(joint, case.operation)
+        alphas = list(case.operation.alphas)
         point = case.points[0].name if isinstance(case, study.Study) else ""
     else:
         joint, alphas = joints.load(source, {}, str(source)), [asked_alpha]

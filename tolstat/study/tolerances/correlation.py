@@ -24,7 +24,7 @@ from tolstat.common.late import special
 from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
-from tolstat.study.selection import Reading, select
+from tolstat.study.selection import Reading, select, without_joint
 from tolstat.study.tolerances.distributions import Distribution, Normal
 
 Array = NDArray[np.float64]
@@ -125,7 +125,8 @@ def _named(pattern: str, toleranced: Sequence[str], where: str) -> list[str]:
         remedy = "give offset_t, offset_z, tilt_t and tilt_z tolerances of their own, and correlate those"
         raise input_error(where, f"{pattern} is a zone: it cannot be correlated", remedy)
     if not names:
-        raise input_error(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")
+        remedy = without_joint(pattern, toleranced) or f"add tolerances.{pattern}, or remove it here"
+        raise input_error(where, f"{pattern!r} has no tolerance", remedy)
     return names
 
 

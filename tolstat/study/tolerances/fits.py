@@ -138,13 +138,19 @@ class Fit(NamedTuple):
 
 
 def read(file: Reading) -> Fit | None:
-    """Read the fit of ``[tolerances]``; None where the table has none.
+    """Read the fit of ``[tolerances]``, of all joints in series; None where the table has none.
 
     A fit with faults is replaced by another one, so that other faults of the file are those of the file: without
     diameters those of the joint, correlations of diameters and bonuses would seem to lack them.
     """
     table = file.data.get("tolerances")
-    if not isinstance(table, Mapping) or KEY not in table:
+    if not isinstance(table, Mapping):
+        return None
+    for joint in sorted(selection.joints(file.mechanism)):
+        if isinstance(table.get(joint), Mapping) and KEY in table[joint]:
+            remedy = "write tolerances.fit, or the tolerances of the diameters of each joint"
+            file.fault(("tolerances", joint, KEY), "is the fit of one joint: a fit is of all", remedy)
+    if KEY not in table:
         return None
     data = table[KEY]
     with gather(file.faults):
@@ -221,6 +227,8 @@ def entries(table: Mapping[str, Any], fit: Fit | None, mechanism: Mechanism) -> 
     """
     for key, value in table.items():
         if key != KEY:
+            if key in selection.joints(mechanism) and isinstance(value, Mapping):
+                value = {name: of_joint for name, of_joint in value.items() if name != KEY}
             yield from selection.entries({key: value}, mechanism, "tolerances")
         elif fit is not None:
             for pattern, zone in zip(patterns(mechanism), fit.entry.zones, strict=True):

@@ -1,0 +1,234 @@
+"""Studies of two joints in series: names begin with the joint, and what only one joint can have is refused."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from tests.support.environment import ROOT
+from tolstat import sampling, study
+from tolstat.common.cardan import CARDAN, SERIES
+from tolstat.common.errors import InputError
+from tolstat.joint import perturb
+from tolstat.study import assumptions, changes, points, schema
+
+HEAD = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "8 deg"
+speed = "1500 rpm"
+torque = "100 N*m"
+[series]
+alpha = "6 deg"
+inertia = "0.01 kg*m^2"
+"""
+SCATTER = '[tolerances]\n"joint*.pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "uniform" }\n'
+RANDOM = "[sampling]\nn = 60\n"
+WHOLE = HEAD + SCATTER + RANDOM
+CASES = HEAD + '[sampling]\nmethod = "cases"\n[[case]]\nname = "tilt"\nerrors.joint1.pin1.tilt_z = "0.1 deg"\n'
+ENTRY = '{ plus_minus = "0.05 mm", distribution = "uniform" }'
+ZONE = '{ zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }'
+FIT = '{ basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+PARTNER = 'partner = { position = "after", alpha = "12 deg", inertia = "0.02 kg*m^2" }'
+JOINTS = ("joint1", "joint2")
+
+
+def load(text: str) -> study.Study:
+    return study.load(Path("x.toml"), text=text)
+
+
+def toleranced(entries: str) -> str:
+    return f"{HEAD}[tolerances]\n{entries}\n{RANDOM}"
+
+
+def refused(text: str) -> list[str]:
+    """Key path of each fault with what was found, and its remedy."""
+    with pytest.raises(InputError) as raised:
+        load(text)
+    return [f"{fault.place.partition(': ')[2]}: {fault.found} | {fault.remedy}" for fault in raised.value.faults]
+
+
+def test_the_table_makes_a_study_of_two_joints() -> None:
+    read = load(WHOLE)
+    assert read.mechanism == SERIES
+    assert read.operation.alphas == pytest.approx(np.radians([8, 6]))
+    assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, joint 2 of 6 deg, its plane 180 deg ahead"
+    drawn = perturb(read.joint, read.operation, sampling.draw(read))
+    assert (drawn["pin_point"][1:] != 0.0).any(axis=2).all()
+    assert load(CASES).operations[0].mechanism == SERIES
+    assert points.Point.of("", read.points[0].values()) == read.points[0]
+
+
+@pytest.mark.parametrize(
+    ("entries", "scattering"),
+    [
+        (f'"*.pin1.offset_[ez]" = {ENTRY}', [f"{joint}.pin1.offset_{axis}" for joint in JOINTS for axis in "ez"]),
+        (f"joint1.pin2.offset_t = {ENTRY}", ["joint1.pin2.offset_t"]),
+        (f'"joint2.*.offset_e" = {ENTRY}', [f"joint2.{p}{i}.offset_e" for p in ("pin", "hole") for i in range(1, 5)]),
+        (f'"joint*.pin1.clearance" = {ENTRY}', [f"{joint}.pin1.clearance" for joint in JOINTS]),
+        (f"fit = {FIT}", [f"{j}.{part}{i}.diameter" for part in ("pin", "hole") for j in JOINTS for i in range(1, 5)]),
+        (
+            f'"joint*.pin3.position" = {ZONE}',
+            [f"{joint}.pin3.{key}" for joint in JOINTS for key in ("offset_t", "offset_z", "tilt_t", "tilt_z")],
+        ),
+        (
+            f'"joint2.input_holes.position" = {ZONE.replace("22 mm", "100 mm")}',
+            [f"joint2.hole{i}.{key}" for i in (1, 2) for key in ("offset_t", "offset_z", "tilt_t", "tilt_z")],
+        ),
+        ('"operation.alpha" = { plus_minus = "1 deg", distribution = "uniform" }', ["operation.alpha"]),
+    ],
+)  # fmt: skip
+def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) -> None:
+    errors = sampling.draw(load(toleranced(entries)))[1:]
+    names = errors.dtype.names or ()
+    assert sorted(name for name in names if np.ptp(errors[name]) > 0) == sorted(scattering)
+
+
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        (
+            HEAD.replace('alpha = "6 deg"', 'alhpa = "6 deg"') + SCATTER + RANDOM,
+            ["series.alpha: missing key | add series.alpha, for example alpha = \"6 deg\"",
+             "series.alhpa: unknown key | did you mean 'alpha'?"],
+        ),
+        (
+            HEAD.replace('"6 deg"', '"90 deg"') + SCATTER + RANDOM,
+            ["series.alpha: a Cardan joint cannot turn at 90 deg | give less than 90 deg"],
+        ),
+        (
+            toleranced(f"pin1.offset_t = {ENTRY}"),
+            ["tolerances.pin1.offset_t: selects nothing | "
+             "write the joint before it: joint1.pin1.offset_t, or joint*.pin1.offset_t for all joints"],
+        ),
+        (
+            toleranced(f'"*.offset_t" = {ENTRY}'),
+            ["tolerances.*.offset_t: selects nothing | "
+             "write the joint before it: joint1.*.offset_t, or joint*.*.offset_t for all joints"],
+        ),
+        (
+            toleranced(f'"*.pin1.*" = {ENTRY}'),
+            ["tolerances.*.pin1.*: selects quantities of different kinds (m, rad) | write one entry for each kind"],
+        ),
+        (
+            toleranced(f'"joint1.operation.alpha" = {ENTRY}'),
+            ["tolerances.joint1.operation.alpha: selects nothing | did you mean 'operation.alpha'?"],
+        ),
+        (
+            toleranced("joint1.pin1 = 3"),
+            ["tolerances.joint1.pin1: selects nothing | allowed here: offset_e, offset_t, offset_z, tilt_t, tilt_z, "
+             "diameter, clearance, offset_radial, position, perpendicularity, angularity"],
+        ),
+        (
+            toleranced(f"joint1.fit = {FIT}"),
+            ["tolerances.joint1.fit: is the fit of one joint: a fit is of all | "
+             "write tolerances.fit, or the tolerances of the diameters of each joint"],
+        ),
+        (
+            toleranced(f'fit = {FIT}\n"joint2.pin1.diameter" = {ENTRY}'),
+            ["tolerances.joint2.pin1.diameter: joint2.pin1.diameter is set by tolerances.fit already | "
+             "remove one of the two, or narrow the pattern"],
+        ),
+        (
+            WHOLE + '[[correlation]]\nbetween = ["pin1.offset_t", "joint2.pin1.offset_t"]\nrho = 0.5\n',
+            ["correlation[0].between: 'pin1.offset_t' has no tolerance | "
+             "write the joint before it: joint1.pin1.offset_t, or joint*.pin1.offset_t for all joints"],
+        ),
+        (
+            WHOLE + '[limits]\n"*.F" = "900 N"\n"joint3.cross1.F" = "900 N"\njoint1.psi = 1e-3\n',
+            ["limits.*.F: selects nothing | write the joint before it: joint1.*.F, or joint*.*.F for all joints",
+             "limits.joint3.cross1.F: selects nothing | did you mean 'joint2.cross1'?",
+             "limits.joint1.psi: selects nothing | did you mean 'psi'?"],
+        ),
+        (
+            WHOLE + '[output]\nresults = ["cross*.F_max"]\n',
+            ["output.results[0]: 'cross*.F_max' selects nothing | did you mean '*.cross*.F_max'?"],
+        ),
+        (
+            WHOLE.replace("[series]", f"{PARTNER}\n[series]"),
+            ["operation.partner: stands beside [series]: both joints are simulated, none stands for the other | "
+             "remove it, or [series]"],
+        ),
+        (
+            CASES + f'[[variant]]\nname = "x"\noperation.{PARTNER}\n',
+            ["variant.partner: stands beside [series]: both joints are simulated, none stands for the other | "
+             "remove it, or [series]"],
+        ),
+        (
+            WHOLE.replace("[operation]", 'shaft.axial = "free"\n[operation]') + '[solver]\nfidelity = "ideal"\n',
+            ["joint.shaft.axial: is not rigid: in series, tube and shafts are held on their axes, along and across | "
+             'write "rigid", or remove [series]',
+             "solver.fidelity: 'ideal' does not hold in series: its closed forms are those of one joint | "
+             'write "quasistatic" or "dynamic"'],
+        ),
+        (
+            WHOLE.replace("[series]", 'axial_force = "20 N"\n[series]'),
+            ["operation.axial_force: has no effect: the output shaft is rigid along its axis | remove it"],
+        ),
+    ],
+)  # fmt: skip
+def test_what_two_joints_cannot_have_is_refused(text: str, faults: list[str]) -> None:
+    assert refused(text) == faults
+
+
+def test_names_of_a_joint_are_refused_where_there_is_one() -> None:
+    text = WHOLE.replace('[series]\nalpha = "6 deg"\ninertia = "0.01 kg*m^2"\n', "").replace("joint*.", "")
+    assert load(text).mechanism == CARDAN
+    text += '[limits]\n"joint1.cross1.F" = "900 N"\n'
+    assert refused(text) == ["limits.joint1.cross1.F: selects nothing | did you mean 'cross1.F'?"]
+
+
+def test_shafts_are_not_freed() -> None:
+    """Their mounting is no assumption, and no command frees them."""
+    read = load(toleranced(f'"joint*.pin*.offset_z" = {ENTRY}'))
+    assert "mounting" in assumptions.given(read)
+    assert "mounting" not in [assumption.name for assumption in assumptions.assumptions(read)]
+    command = points.with_free_shaft("x.toml", "x", read.joint, read.mechanism)
+    note = points.note_on_shafts(read.tolerances, ["rigid"], command)
+    assert note.endswith("some loads are larger than with a spline.")
+
+
+def test_the_second_joint_may_be_too_fast() -> None:
+    fast = WHOLE.replace("1500 rpm", "5000 rpm")
+    assert list(assumptions.warnings(load(fast.replace('"8 deg"', '"5 deg"')))) == []
+    (warning,) = assumptions.warnings(load(fast.replace('"6 deg"', '"7 deg"').replace('"8 deg"', '"5 deg"')))
+    assert "5000 rpm at 7 deg: speed times angle, 35000 rpm deg" in warning.found
+
+
+def test_keys_of_the_second_joint_are_changed() -> None:
+    read = load(WHOLE)
+    changed = changes.read(read, changes.with_settings(read, ["series.alpha=8 deg"]))
+    assert changed.operation.alphas == pytest.approx(np.radians([8, 8]))
+    one = study.load(ROOT / "studies" / "iso2768_f.toml")
+    with pytest.raises(InputError, match="is in section 'series', which the study lacks"):
+        changes.with_settings(one, ["series.alpha=8 deg"])
+
+
+def test_editors_know_both_joints() -> None:
+    known = jsonschema.Draft7Validator(schema.schema("study"))
+    dotted = toleranced(
+        f'joint1.pin2.offset_t = {ENTRY}\njoint2."hole*.tilt_t" = {{ plus_minus = "1 deg", distribution = "uniform" }}'
+    )
+    limited = WHOLE + '[limits]\n"joint*.cross*.F" = "1 kN"\njoint2.fork1.T = "3 N*m"\n"joint1.cross1.F at a" = "9 N"\n'
+    for text in (WHOLE, CASES, dotted, limited):
+        assert list(known.iter_errors(tomllib.loads(text))) == []
+    for text in (WHOLE.replace("inertia", "inertai"), WHOLE.replace("joint*.pin*.offset_t", "joint1.pin1.ofset_t")):
+        assert not known.is_valid(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    ("key", "accepted"), [('"bushing.cross.k_x"', True), ('bushing."cross.k_x"', True), ("bushing.cross.k_x", False)]
+)
+def test_editors_and_reader_agree_on_keys_of_a_joint_that_are_swept(key: str, accepted: bool) -> None:
+    text = f'{HEAD}[sampling]\nmethod = "sweep"\n[sweep]\n{key} = {{ from = "1e9 N/m", to = "2e9 N/m", points = 3 }}\n'
+    known = jsonschema.Draft7Validator(schema.schema("study"))
+    assert known.is_valid(tomllib.loads(text)) == accepted
+    if accepted:
+        assert load(text).samples == 3
+    else:
+        assert refused(text) == ["sweep.bushing.cross: selects nothing | allowed here: k_x, k_y, k_z, k_bx, k_by, k_tz"]

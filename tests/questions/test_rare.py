@@ -234,7 +234,7 @@ def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, 
     plan, found, path = whole
     calls = []
 
-    def stop_at_times(params, options, histories="none", n_harmonics=0):
+    def stop_at_times(params, options, **given):
         calls.append(len(params))
         if len(calls) % 5 == 0:
             raise KeyboardInterrupt

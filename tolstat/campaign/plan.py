@@ -18,7 +18,6 @@ from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import verify
 from tolstat.campaign.block import spread
 from tolstat.campaign.run import choose_fidelity
-from tolstat.common.cardan import CARDAN
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
 from tolstat.common.mechanism import Mechanism
@@ -324,7 +323,7 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:
-    if mechanism != CARDAN:
+    if mechanism.in_series:
         return Reversals(0, None, None)
     torque = ideal.reversal_torque(params)
     here = np.abs(params["torque"]) < torque

@@ -207,6 +207,11 @@ class Mechanism(NamedTuple):
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
 
     @property
+    def in_series(self) -> bool:
+        """Whether it has several Cardan joints, one behind the other."""
+        return len(self.cardan) > 1
+
+    @property
     def dof(self) -> int:
         """Number of unknowns."""
         return 6 * len(self.lumps) + len(self.unknowns)

@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.joint import derived
@@ -80,7 +79,7 @@ def given(study: Study) -> tuple[str, ...]:
     series so is ``shaft.axial``, since the shafts are held.
     """
     replaced = {entry.name for entry in study.assumed}
-    of_study = {*leaves(_keys_of_study(study)), *(() if study.mechanism == CARDAN else ("shaft.axial",))}
+    of_study = {*leaves(_keys_of_study(study)), *(("shaft.axial",) if study.mechanism.in_series else ())}
     keys = derived.changed(of_study, leaves(study.joint.given("json")))
     return tuple(
         entry.name

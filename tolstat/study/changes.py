@@ -13,7 +13,6 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from tolstat.common import units
-from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
@@ -44,7 +43,7 @@ NAMES = 2
 
 def _settable(mechanism: Mechanism) -> tuple[str, ...]:
     """`SETTABLE`, and ``series`` of a study in series: a change does not make another mechanism."""
-    return SETTABLE if mechanism == CARDAN else (*SETTABLE, "series")
+    return (*SETTABLE, "series") if mechanism.in_series else SETTABLE
 
 
 def with_settings(study: Study, settings: Sequence[str]) -> str:

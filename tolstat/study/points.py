@@ -15,7 +15,6 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field
 
 from tolstat.common import loads, units
-from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
@@ -314,7 +313,7 @@ def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -
     mechanism : Mechanism
         What is simulated: shafts of joints in series are held.
     """
-    if mechanism != CARDAN:
+    if mechanism.in_series:
         return ""
     needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
     lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]

@@ -290,6 +290,9 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
+    if any(setting.fidelity == "ideal" and setting.joint.friction.mu is not None for setting in settings):
+        found = "'ideal' does not hold with friction, which its closed forms leave out"
+        yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
     for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
         found = "stands beside [series]: both joints are simulated, none stands for the other"
         yield path, found, "remove it, or [series]"

@@ -212,6 +212,10 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         for i, face in enumerate(mechanism.faces):
             play = joint.thrust.end_play + errors[f"{face.name.removesuffix(face.name[-1])}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+    if joint.shaft.unbalance is not None:
+        size = joint.shaft.unbalance.size + errors["shaft.unbalance"]
+        angle = (joint.shaft.unbalance.angle or 0.0) + errors["shaft.unbalance_angle"]
+        params["unbalance"] = (size * np.array([np.cos(angle), np.sin(angle)])).T
     if joint.friction.mu is not None:
         params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params

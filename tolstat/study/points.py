@@ -234,6 +234,7 @@ def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
 
 
 FORCE = "operation.axial_force"
+_DIRECTION = "shaft.unbalance_angle"
 Varied = Mapping[str, Collection[str]]
 
 
@@ -261,7 +262,7 @@ class Setting(NamedTuple):
 
 
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
-    """Refuse axial forces and swings without effect, and closed forms where an axial force moves the output shaft.
+    """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
     In series, refuse what only one joint can have.
 
@@ -270,7 +271,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     settings : sequence of Setting
         All joints of a study at all of their operating points.
     varied : mapping
-        Errors of the operating point that scatter or are swept, to the sections of the study in which they do.
+        Errors of operating point and shaft that scatter or are swept, to the sections of the study in which they do.
 
     Yields
     ------
@@ -293,6 +294,14 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if any(setting.fidelity == "ideal" and setting.joint.friction.mu is not None for setting in settings):
         found = "'ideal' does not hold with friction, which its closed forms leave out"
         yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
+    for part in {part for one in settings for part in one.joint.parts}:
+        if not all(part in setting.joint.parts for setting in settings):
+            found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
+            yield ("joint",), found, "give it to all of them, or to none"
+    of_shafts = [setting.joint.shaft.unbalance for setting in settings]
+    if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in of_shafts):
+        remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
+        yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
     for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
         found = "stands beside [series]: both joints are simulated, none stands for the other"
         yield path, found, "remove it, or [series]"

@@ -245,11 +245,14 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "face_c": joint.thrust.c if joint.thrust else 0.0,
         "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
         "slip_speed": joint.friction.slip_speed,
-        "bearing_at": [
-            (sign * ends.bearings[0], sign * ends.bearings[1])
-            for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
-            if ends is not None
-        ],
+        "bearing_at": np.reshape(
+            [
+                sign * np.array(ends.bearings)
+                for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
+                if ends is not None
+            ],
+            (-1, 2),
+        ),
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
         "k_a": shaft.k_a,

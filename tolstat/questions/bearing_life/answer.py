@@ -203,8 +203,8 @@ def _why_unrated(lives: rating.Lives, joints: str) -> str:
     whose = "a bearing of " if lives.in_series else ""
     return (
         f"{whose}{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from "
-        "which on the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not renewed "
-        "there, and fretting, which no rating covers, is to be expected"
+        "which on the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not "
+        "renewed there, and fretting, which no rating covers, is to be expected"
     )
 
 

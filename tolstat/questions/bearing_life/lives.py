@@ -158,7 +158,7 @@ def lives_of(view: View) -> Lives:
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
         {name: int(n) for name, n in zip(view.points, (some[:, skip:] & valid).sum(axis=1), strict=True) if n}
-        for some in (joints.any(axis=2) for joints in small)
+        for some in (np.asarray(joints.any(axis=2)) for joints in small)
     )
     return Lives(
         view=view,

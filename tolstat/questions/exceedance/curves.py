@@ -64,7 +64,8 @@ def _group_panel(view: View, group: str, kind: Kind) -> Panel:
             ax.axhline(end, **look, label="upper end where none exceeds x")
 
     title = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}"
-    return Panel(f"exceedance-{group}-{kind.symbol}", title, title, draw, (drawing.WIDTH, 3.9))
+    height = 3.9 + 0.2 * max(len(names) - 4, 0)  # a line of the legend for each
+    return Panel(f"exceedance-{group}-{kind.symbol}", title, title, draw, (drawing.WIDTH, height))
 
 
 def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) -> tuple[float, float]:
@@ -102,7 +103,7 @@ def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sa
         line = _step(ax, table, table["estimate"], floor, color=style.FAINT, lw=0.7, ls=dash)
         drawing.switched(line, "others")
     for level, which in sorted(limits.items()):
-        of = "" if len(which) == len(loads) else f" ({', '.join(str(i + 1) for i in which)})"
+        of = "" if len(which) == len(loads) else f" ({_numbers(view, [loads[i].name for i in which])})"
         beyond = " →" if level > high else " ←" if level < low else ""
         colour = style.curve(which[0])["color"] if len(which) == 1 < len(loads) else style.INK
         look = {"color": colour, "lw": 1.4, "zorder": 2}
@@ -112,6 +113,16 @@ def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sa
         else:
             ax.axvline(level, **look)
     return high, floor
+
+
+def _numbers(view: View, names: Sequence[str]) -> str:
+    """Numbers of the bushings of loads, of joints in series by joint: ``1, 2``, ``joint2: 1, 2``."""
+    numbers: dict[str, list[str]] = {}
+    for name in names:
+        place = load_of(name, view.mechanism).place
+        joint, _, bushing = place.name.rpartition(".")
+        numbers.setdefault(joint, []).append(bushing.removeprefix(place.group))
+    return "; ".join(f"{joint}: {', '.join(each)}".removeprefix(": ") for joint, each in numbers.items())
 
 
 def _groups(view: View) -> list[str]:

@@ -1,0 +1,80 @@
+"""Two joints in series: what differs from one joint in the questions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.environment import ROOT
+from tests.support.views import FakeStore
+from tolstat import joint, study
+from tolstat.campaign.plan import Reversals, _reversals
+from tolstat.common.cardan import SERIES
+from tolstat.common.columns import result_columns
+from tolstat.common.tables import Status, tables, without_results
+from tolstat.joint import nominal_errors, perturb
+from tolstat.questions.bearing_life import answer as bearing_life
+from tolstat.questions.bearing_life.lives import lives_of
+from tolstat.questions.exceedance import curves
+from tolstat.solver import stationary
+from tolstat.store.view import View
+from tolstat.study.points import Point
+
+BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "100 h"}
+
+
+@pytest.fixture(scope="module")
+def of_study():
+    return study.load(ROOT / "studies" / "series.toml")
+
+
+@pytest.fixture
+def view(of_study):
+    """Make a view of joints whose bearings carry 600 N each; `angles` are the misalignments, deg."""
+
+    def make(angles=(15.0, 30.0), n=40):
+        results = without_results(n, Status.OK, SERIES)
+        rise = np.random.default_rng(1).gamma(3.0, 0.1, n)
+        for name in (name for name in results.dtype.names if name.endswith("_max")):
+            results[name] = (500.0 * (1.0 + rise)).reshape(-1, *(1 for _ in results[name].shape[1:]))
+        results["settled"], results["equivalent_load"], results["mode_share"] = 1, 600.0, 0.25
+        stationary.fill_intervals(results, SERIES)
+        held = joint.load("cirelli2021", {"bearing": BEARING}, "x.toml").given("json")
+        errors = np.repeat(nominal_errors(1, SERIES), n)
+        store = FakeStore("random", of_study.limits, errors, results, columns=result_columns(SERIES), joint=held)
+        first, second = np.radians(angles)
+        series = of_study.operation.series.model_copy(update={"alpha": second})
+        operation = of_study.operation.model_copy(update={"alpha": first, "series": series})
+        store.mechanism, store.points = SERIES, {"": Point("", operation, 1.0)}
+        return View(store)
+
+    return make
+
+
+def test_each_bearing_swings_by_the_misalignment_of_its_joint(view):
+    """Twice the angle is half the life."""
+    hours = lives_of(view()).hours
+    assert hours.shape == (39, 9)
+    np.testing.assert_allclose(hours[:, :4], 2.0 * hours[:, 4:8], rtol=1e-12)
+
+
+def test_a_pair_has_no_rating_where_one_of_its_bearings_frets(view):
+    lives = lives_of(view((15.0, 2.0)))
+    assert np.isfinite(lives.hours[:, :4]).all()
+    assert np.isnan(lives.hours[:, 4:]).all()
+    assert lives.unrated == 39
+    (verdict,) = bearing_life.life_verdicts(view((15.0, 2.0)), np.nan)
+    assert "a bearing of every joint swings by less than" in verdict.words
+
+
+def test_no_reversals_are_counted(of_study):
+    params = perturb(of_study.joint, of_study.operation, nominal_errors(3, SERIES))
+    params["torque"] = 1e-6
+    assert _reversals(params, np.zeros(3, tables(SERIES).RESULT), SERIES) == Reversals(0, None, None)
+
+
+def test_limits_of_the_picture_name_the_joint(view):
+    axes = curves.sheet(view(), ()).axes
+    labels = axes[3].get_legend_handles_labels()[1]
+    assert "limit 80 N m (joint2: 1, 2, 3, 4) ←" in labels  # the loads are all above it
+    assert "joint1.fork4.T" in labels

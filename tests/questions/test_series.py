@@ -11,6 +11,7 @@ from tolstat import joint, study
 from tolstat.campaign.plan import Reversals, _reversals
 from tolstat.common.cardan import SERIES
 from tolstat.common.columns import result_columns
+from tolstat.common.errors import InputError
 from tolstat.common.tables import Status, tables, without_results
 from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
@@ -18,6 +19,8 @@ from tolstat.questions.bearing_life.lives import lives_of
 from tolstat.questions.exceedance import curves
 from tolstat.solver import stationary
 from tolstat.store.view import View
+from tolstat.study import changes
+from tolstat.study.assumptions import assumptions
 from tolstat.study.points import Point
 
 BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "100 h"}
@@ -78,3 +81,17 @@ def test_limits_of_the_picture_name_the_joint(view):
     labels = axes[3].get_legend_handles_labels()[1]
     assert "limit 80 N m (joint2: 1, 2, 3, 4) ←" in labels  # the loads are all above it
     assert "joint1.fork4.T" in labels
+
+
+def test_a_change_may_set_joint_2(of_study):
+    text = changes.with_settings(of_study, ["series.alpha=8 deg"])
+    assert changes.read(of_study, text).operation.alphas == pytest.approx(np.radians([8.0, 8.0]))
+    assert changes.words(of_study, text) == "changed: series.alpha 6 deg → 8 deg"
+    alone = study.load(ROOT / "studies" / "rigid_shafts.toml")
+    with pytest.raises(InputError, match="is in section 'series', which changes no joint"):
+        changes.with_settings(alone, ["series.alpha=8 deg"])
+
+
+def test_the_mounting_of_shafts_is_not_assumed(of_study):
+    assert "mounting" in {each.name for each in assumptions(study.load(ROOT / "studies" / "rigid_shafts.toml"))}
+    assert "mounting" not in {each.name for each in assumptions(of_study)}

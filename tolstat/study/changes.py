@@ -13,6 +13,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from tolstat.common import units
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
@@ -41,6 +42,11 @@ NAMES = 2
 """Number of parts of a key of an operating point or fit, and of the name of an error of one joint: ``pin1.tilt_t``."""
 
 
+def _settable(mechanism: Mechanism) -> tuple[str, ...]:
+    """`SETTABLE`, and ``series`` of a study in series: a change does not make another mechanism."""
+    return SETTABLE if mechanism == CARDAN else (*SETTABLE, "series")
+
+
 def with_settings(study: Study, settings: Sequence[str]) -> str:
     """Text of a study with some keys changed; comments and seed are kept.
 
@@ -53,7 +59,8 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
         ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
         entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
-        operating points ``"operation.start.alpha=12 deg"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later
+        operating points ``"operation.start.alpha=12 deg"``; in series ``"series.alpha=8 deg"``;
+        ``"errors.pin1.tilt_t=0.1 deg"``. Later
         ones override patterns of earlier ones.
 
     Returns
@@ -72,10 +79,10 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         for setting in settings:
             place = f"--set {setting!r}"
             with gather(faults):
-                path, value = _parsed(setting, place)
+                path, value = _parsed(setting, place, study.mechanism)
                 if (other := places.setdefault(tuple(path), place)) is not place:
                     raise input_error(place, f"sets the key of {other} again", "remove one of the two")
-                if path[0] in SETTABLE:
+                if path[0] in _settable(study.mechanism):
                     text = _set(text, path, value, place, study.mechanism)
                 elif path[0] == fits.KEY and len(path) == NAMES:
                     text = rewriting.with_keys(text, {fits.PATH: {path[1]: value}}, place)
@@ -109,25 +116,25 @@ def keys_of_joint(text: str, study: Study) -> dict[str, Any]:
 
 def words(study: Study, text: str) -> str:
     """What a text changes: keys with their values before and after, entries that are gone, and new ones."""
-    old, new = (_flat(tomllib.loads(each)) for each in (study.text, text))
+    old, new = (_flat(tomllib.loads(each), study.mechanism) for each in (study.text, text))
     values = [f"{key} {old[key]} → {value}" for key, value in new.items() if key in old and old[key] != value]
     gone, added = ({_shown(key, study.mechanism) for key in a.keys() - b.keys()} for a, b in ((old, new), (new, old)))
     found = {"changed": values, "without": sorted(gone), "new": sorted(added)}
     return "; ".join(f"{word}: {', '.join(items)}" for word, items in found.items() if items)
 
 
-def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
     """Values of the sections that are changed by dotted key, without ``tolerances``."""
     points = data["operation"]
     points = {str(point["name"]): point for point in points} if isinstance(points, list) else points
-    sections = {key: data.get(key, {}) for key in SETTABLE} | {"operation": points}
+    sections = {key: data.get(key, {}) for key in _settable(mechanism)} | {"operation": points}
     return leaves(sections) | leaves(data["tolerances"])
 
 
 def _shown(key: str, mechanism: Mechanism) -> str:
     """Key of the joint or the operation; of a tolerance its entry."""
     path = key.split(".")
-    return key if path[0] in SETTABLE else ".".join(path[: _names(path, mechanism)])
+    return key if path[0] in _settable(mechanism) else ".".join(path[: _names(path, mechanism)])
 
 
 def _names(path: Sequence[str], mechanism: Mechanism) -> int:
@@ -187,10 +194,10 @@ def differing(study: Study, changed: Study) -> dict[str, Any]:
     return {key: new.get(key) for key in keys if not key.startswith("sampling.")}
 
 
-def _parsed(setting: str, place: str) -> tuple[list[str], Any]:
+def _parsed(setting: str, place: str, mechanism: Mechanism) -> tuple[list[str], Any]:
     """Parts of the key of a setting, without ``tolerances``, and its value."""
     path, value = rewriting.parsed(setting, place, EXAMPLE)
-    if path[0] in SECTIONS and path[0] not in (*SETTABLE, "tolerances"):
+    if path[0] in SECTIONS and path[0] not in (*_settable(mechanism), "tolerances"):
         raise input_error(place, f"is in section {path[0]!r}, which changes no joint", OTHERS)
     return path[1:] if path[0] == "tolerances" else path, value
 

@@ -19,6 +19,7 @@ from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simu
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
+from tolstat.common.cardan import CARDAN
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError, input_error
 from tolstat.common.tables import Simulation, Status
@@ -281,7 +282,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [MIN_SAMPLES] * ("cycles" in histories)
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
-        closed_form = not study.has_axial_force
+        closed_form = study.mechanism == CARDAN and not study.has_axial_force
         simulate = partial(simulate_beside, mechanism=study.mechanism)
         settings_of_choice = params, options, budget, study.asked, simulate, min_steps, closed_form
         return fidelity.choose(*settings_of_choice, mechanism=study.mechanism)

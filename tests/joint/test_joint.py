@@ -414,7 +414,7 @@ def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
 
 
 def test_equal_joints_in_series_turn_the_output_evenly(joint):
-    """Planes half a turn apart and no offset, the default of a study; at 90 deg of offset both joints' swings add up."""
+    """Planes half a turn apart and no offset are a study's default; at 90 deg of offset both joints' swings add up."""
     theta = np.linspace(0.0, 2 * np.pi, 37)
     point = joints.Operation(alpha="20 deg", speed="500 rpm", torque="100 N*m")
     for offset, swing in (("0 deg", 0.0), ("90 deg", 1 / np.cos(np.radians(20)) ** 2 - 1)):

@@ -28,6 +28,11 @@ from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
+IDEAL_IN_SERIES = (
+    "'ideal' does not hold in series: its closed forms are those of one joint",
+    'write "quasistatic" or "dynamic"',
+)
+"""Fault of joints in series, and the remedy."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -309,8 +314,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         found = "is not rigid: in series, tube and shafts are held on their axes, along and across"
         yield ("joint", "shaft", "axial"), found, 'write "rigid", or remove [series]'
     if any(setting.fidelity == "ideal" for setting in in_series):
-        found = "'ideal' does not hold in series: its closed forms are those of one joint"
-        yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
+        yield ("solver", "fidelity"), *IDEAL_IN_SERIES
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:

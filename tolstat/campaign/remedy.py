@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import strict, tables
-from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, gather, input_error, raise_all
 from tolstat.common.fields import HistorySpec
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
@@ -22,7 +21,7 @@ from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
 from tolstat.study import Study
-from tolstat.study.points import IDEAL_IN_SERIES
+from tolstat.study.points import IDEAL_IN_SERIES, IDEAL_WITH_FRICTION
 from tolstat.study.rewriting import parsed
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
@@ -213,8 +212,10 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
     if study.has_axial_force and solver.fidelity == "ideal":
         faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
-    if solver.fidelity == "ideal" and study.mechanism != CARDAN:
+    if solver.fidelity == "ideal" and study.mechanism.in_series:
         faults.append(Fault("--set: solver.fidelity", *IDEAL_IN_SERIES))
+    if solver.fidelity == "ideal" and study.mechanism.friction:
+        faults.append(Fault("--set: solver.fidelity", *IDEAL_WITH_FRICTION))
     raise_all(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")

@@ -28,6 +28,10 @@ from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
+IDEAL_WITH_FRICTION = (
+    "'ideal' does not hold with friction, which its closed forms leave out",
+    'write "quasistatic" or "dynamic"',
+)
 IDEAL_IN_SERIES = (
     "'ideal' does not hold in series: its closed forms are those of one joint",
     'write "quasistatic" or "dynamic"',
@@ -297,8 +301,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
     if any(setting.fidelity == "ideal" and setting.joint.friction.mu is not None for setting in settings):
-        found = "'ideal' does not hold with friction, which its closed forms leave out"
-        yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
+        yield ("solver", "fidelity"), *IDEAL_WITH_FRICTION
     for part in {part for one in settings for part in one.joint.parts}:
         if not all(part in setting.joint.parts for setting in settings):
             found = f"some joints of the study have {part.replace('_', ' ')}, others have none"

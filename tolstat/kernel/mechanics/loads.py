@@ -12,7 +12,8 @@ from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
 (FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE, THRUST, NEAR, FAR) = range(11)
-LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS, LOSS = range(11, 18)
+LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS = range(11, 17)
+NEAR_BALLS, NEAR_ROLLERS, FAR_BALLS, FAR_ROLLERS, LOSS = range(17, 22)
 """Kinds, in the order of `load_kinds.all_kinds`; ``par.begin`` has the first element of each."""
 OF_FORCES, OF_TORQUES = range(2)
 """Measures, whose largest load changes are relative to: rows of ``par.measured`` and ``par.of_measure``."""

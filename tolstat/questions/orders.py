@@ -209,7 +209,7 @@ def _bearings(view: View) -> Rows:
         p, each = float(Fraction(exponent_of[name] or 1)), [view.load(f"{name}{at}") for at in of_points]
         nominal = (share @ np.array([load.nominal for load in each]) ** p) ** (1 / p)
         values = (share @ np.array([load.values for load in each]) ** p) ** (1 / p)
-        rows.append(_quantiles(Sample.of(values, view.status, view.design, name, "N", nominal)))
+        rows.append(_quantiles(Sample.of(values, view.status, view.design, name, "N", float(nominal))))
     return rows
 
 

@@ -107,7 +107,8 @@ def simulate_rows(
         run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows, mechanism)
         for i, samples in run:
             if out[i].status in SIMULATED:
-                for name, values in extracted(samples, histories, specs, mechanism).items():
+                on_grid = samples[:: settings.steps_per_rev // options.steps_per_rev]
+                for name, values in extracted(on_grid, histories, specs, mechanism).items():
                     recorded[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)

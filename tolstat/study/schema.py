@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from tolstat.common import loads, strict
-from tolstat.common.cardan import MECHANISMS
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
 from tolstat.common.channels import components, planes
 from tolstat.common.files import data_dir
 from tolstat.common.loads import units_of_limits
@@ -45,7 +45,9 @@ WILD = r"[^.]*[*?\[][^.]*"
 """Half of a name with a wildcard."""
 FEATURE = rf"(?:[^.]*\.)?{WILD}|{WILD}\.[^.]*"
 """What stands before the last dot of a name, with a wildcard; a joint may stand before it."""
-JOINTS = {joint for mechanism in MECHANISMS.values() for joint in joints(mechanism)}
+JOINTS = joints(SERIES)
+WHOLE = tuple(MECHANISMS[named(base, PARTS)] for base in (CARDAN, SERIES))
+"""Mechanisms with all parts, which have the names of all others."""
 """What stands before the names of the features of one of several joints."""
 REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
@@ -152,7 +154,7 @@ def _keys(names: Iterable[str]) -> str:
 
 def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:
     """Names in all mechanisms, with their units."""
-    return {name: unit for mechanism in MECHANISMS.values() for name, unit in units_of(mechanism).items()}
+    return {name: unit for mechanism in WHOLE for name, unit in units_of(mechanism).items()}
 
 
 def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:

@@ -420,6 +420,6 @@ def test_equal_joints_in_series_turn_the_output_evenly(joint):
     for offset, swing in (("0 deg", 0.0), ("90 deg", 1 / np.cos(np.radians(20)) ** 2 - 1)):
         own = joints.Series(alpha="20 deg", inertia="0.01 kg*m^2", offset=offset)
         both = joints.OperationInSeries.model_construct(**dict(point), series=own)
-        par = joints.perturb(joint, both, joints.nominal_errors(1, both.mechanism))[0]
+        par = joints.perturb(joint, both, joints.nominal_errors(1, joints.mechanism_of(joint, both)))[0]
         ratio = ideal.ratio_of_all(theta, par)
         assert_allclose(ratio.max() - 1, swing, atol=1e-12)

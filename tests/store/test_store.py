@@ -219,7 +219,7 @@ def test_a_file_of_an_unknown_mechanism_is_refused(tmp_path: Path, study: fakes.
     new_store(path, study).close()
     with h5py.File(path, "r+") as file:
         metadata.write(file, metadata.read(file).model_copy(update={"mechanism": "chain"}))
-    message = "has mechanism 'chain', this tolstat reads cardan and series\n  hint: use a newer tolstat"
+    message = "has mechanism 'chain', which this tolstat does not know\n  hint: use a newer tolstat"
     for opened in (ResultFile.open, Writer.open):
         with pytest.raises(StoreError, match=message):
             opened(path)

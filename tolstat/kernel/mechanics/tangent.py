@@ -183,7 +183,7 @@ def connect_shaft(unknown, arm, f, torque, edge):
 
 @njit
 def _directions(pin, station, par, work):
-    """Write d(displacements of a station along n and m) / d(pin, hole) to ``work.vectors``."""
+    """Write d(displacements of `station`, a row of stations, along n and m) / d(pin, hole) to ``work.vectors``."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
     lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
@@ -231,7 +231,7 @@ def contact_tangent(pin, cv, par, work):
 
 @njit
 def point_tangent(pin, station, nn, mm, par, work):
-    """Add the stiffness `nn` along n and `mm` along m of a station, N/m."""
+    """Add the stiffness `nn` along n and `mm` along m of `station`, N/m."""
     _directions(pin, station, par, work)
     n, m, by_n, by_m = work.vectors[0], work.vectors[1], work.by_n, work.by_m
     for i in range(12):

@@ -19,7 +19,7 @@ from tolstat.common.mechanism import features
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import validate
 from tolstat.common.tables import tables
-from tolstat.joint import Joint, Operation, material
+from tolstat.joint import Joint, Operation, ideal, material
 from tolstat.joint.contact import LAWS
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, one_force
 
@@ -411,3 +411,15 @@ def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
         ("cross2.F", 700.0, 0.3),
         ("cross1.F", 800.0, 0.2),
     ]
+
+
+def test_equal_joints_in_series_turn_the_output_evenly(joint):
+    """Planes half a turn apart and no offset are a study's default; at 90 deg of offset both joints' swings add up."""
+    theta = np.linspace(0.0, 2 * np.pi, 37)
+    point = joints.Operation(alpha="20 deg", speed="500 rpm", torque="100 N*m")
+    for offset, swing in (("0 deg", 0.0), ("90 deg", 1 / np.cos(np.radians(20)) ** 2 - 1)):
+        own = joints.Series(alpha="20 deg", inertia="0.01 kg*m^2", offset=offset)
+        both = joints.OperationInSeries.model_construct(**dict(point), series=own)
+        par = joints.perturb(joint, both, joints.nominal_errors(1, both.mechanism))[0]
+        ratio = ideal.ratio_of_all(theta, par)
+        assert_allclose(ratio.max() - 1, swing, atol=1e-12)

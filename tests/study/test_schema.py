@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from tests.support.environment import ROOT
 from tolstat import joint, study
 from tolstat.cli import app
-from tolstat.common.cardan import MECHANISMS
+from tolstat.common.cardan import CARDAN, MECHANISMS
 from tolstat.common.errors import InputError
 from tolstat.common.loads import units_of_limits
 from tolstat.common.strict import Strict
@@ -207,8 +207,9 @@ def readable(field: FieldInfo, example: object) -> bool:
     adapter: TypeAdapter[Any] = TypeAdapter(Annotated[field.annotation, *field.metadata, None])
     for unit in ("m", "rad"):
         site = Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")
+        context = {"site": site, "tolerance": SimpleNamespace(site=site, mark=""), "mechanism": CARDAN}
         with suppress(ValidationError):
-            adapter.validate_python(example, context={"site": site, "tolerance": SimpleNamespace(site=site, mark="")})
+            adapter.validate_python(example, context=context)
             return True
     return False
 

@@ -9,11 +9,14 @@ import jsonschema
 import numpy as np
 import pytest
 
+import tolstat
 from tests.support.environment import ROOT
 from tolstat import sampling, study
+from tolstat.campaign import remedy, run
 from tolstat.common.cardan import CARDAN, SERIES
 from tolstat.common.errors import InputError
 from tolstat.joint import perturb
+from tolstat.solver import fidelity
 from tolstat.study import assumptions, changes, points, schema
 
 HEAD = """
@@ -205,7 +208,7 @@ def test_keys_of_the_second_joint_are_changed() -> None:
     changed = changes.read(read, changes.with_settings(read, ["series.alpha=8 deg"]))
     assert changed.operation.alphas == pytest.approx(np.radians([8, 8]))
     one = study.load(ROOT / "studies" / "iso2768_f.toml")
-    with pytest.raises(InputError, match="is in section 'series', which the study lacks"):
+    with pytest.raises(InputError, match="is in section 'series', which changes no joint"):
         changes.with_settings(one, ["series.alpha=8 deg"])
 
 
@@ -232,3 +235,24 @@ def test_editors_and_reader_agree_on_keys_of_a_joint_that_are_swept(key: str, ac
         assert load(text).samples == 3
     else:
         assert refused(text) == ["sweep.bushing.cross: selects nothing | allowed here: k_x, k_y, k_z, k_bx, k_by, k_tz"]
+
+
+def test_joints_in_series_have_no_closed_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pilot of ``auto`` leaves it out, and a retry with it is refused."""
+    closed_form: list[bool] = []
+    monkeypatch.setattr(fidelity, "choose", lambda *args, **given: closed_form.append(args[6]) or {})
+    for text in (WHOLE, toleranced(f'"pin1.offset_t" = {ENTRY}').replace(HEAD, HEAD.partition("[series]")[0])):
+        run.choose_fidelity(load(text + '[solver]\nfidelity = "auto"\n'))
+    assert closed_form == [False, True]
+    with pytest.raises(InputError, match=r"--set: solver\.fidelity: 'ideal' does not hold in series"):
+        remedy.parse_retry("newton_failed", ["solver.fidelity=ideal"], load(WHOLE))
+
+
+@pytest.mark.slow
+def test_psi_of_a_case_is_that_of_the_whole_series(tmp_path: Path) -> None:
+    path = tmp_path / "case.toml"
+    path.write_text(HEAD + '[errors]\njoint2.pin1.tilt_z = "0.2 deg"\n', encoding="utf-8")
+    result = tolstat.simulate_case(study.load_case(path))
+    largest = result.simulation.results["psi_max"][0]
+    assert np.abs(result.to_pandas()["Psi"]).max() == pytest.approx(largest, rel=1e-6)
+    assert largest < 1e-3

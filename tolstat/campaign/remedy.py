@@ -21,6 +21,7 @@ from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
 from tolstat.study import Study
+from tolstat.study.points import IDEAL_IN_SERIES, IDEAL_WITH_FRICTION
 from tolstat.study.rewriting import parsed
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
@@ -211,6 +212,10 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
     if study.has_axial_force and solver.fidelity == "ideal":
         faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
+    if solver.fidelity == "ideal" and study.mechanism.in_series:
+        faults.append(Fault("--set: solver.fidelity", *IDEAL_IN_SERIES))
+    if solver.fidelity == "ideal" and study.mechanism.friction:
+        faults.append(Fault("--set: solver.fidelity", *IDEAL_WITH_FRICTION))
     raise_all(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")

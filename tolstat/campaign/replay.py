@@ -112,7 +112,7 @@ class CaseResult(NamedTuple):
         columns: dict[str, NDArray[Any]] = {
             "theta": theta,
             "tau": tau,
-            "Psi": (tau - ideal.speed_ratio(turned, self.params["alpha"][0, 0])) / tau,
+            "Psi": (tau - ideal.ratio_of_all(turned, self.params[0])) / tau,
         }
         of_loads, pins = load_histories(self.mechanism), kinds(self.mechanism)["contact"].places
         columns |= _components(of_loads[BUSHING_LOADS], histories)

@@ -81,9 +81,9 @@ def series(number: int) -> Mechanism:
 
 SERIES = series(2)
 """Two joints in series."""
-PARTS = ("thrust", "friction", "input_bearings", "output_bearings")
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
-its first and its last shaft."""
+its first and its last shaft, unbalance of the last one."""
 
 
 def named(base: Mechanism, parts: Collection[str]) -> str:
@@ -99,6 +99,7 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         shafts=tuple(shaft._replace(borne=shaft.name in ends) for shaft in base.shafts),
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
+        unbalance="unbalance" in parts,
     )
 
 

@@ -150,6 +150,8 @@ class Kind(NamedTuple):
         return [Field(f"{self.key}_{end}", "1", f"{end} end {of}") for end in ("lower", "upper")]
 
 
+EXPONENTS = {"balls": "3", "rollers": "10/3"}
+"""Exponents of the life of ball and roller bearings (ISO 281)."""
 OVER = "over the revolutions that count"
 ORDERS = (1, 2, 3, 4)
 """Multiples of the input speed whose amplitudes are loads."""
@@ -163,6 +165,7 @@ _LATERAL = f"force across the shaft {OVER}"
 _MOMENT = f"bending moment of the shaft about the joint's centre {OVER}"
 _THRUST = f"force of the thrust face {OVER}"
 _BEARING = f"radial load of the shaft's bearing {OVER}"
+_EQUIVALENT = "radial load of the shaft's bearing, mean over any revolution with exponent"
 _LOSS = "mean power that friction takes in a pin's bearing, or in all, of any revolution"
 _DRIVE = f"torque about the input shaft {OVER}"
 
@@ -211,6 +214,10 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         )
         key, noun = f"{symbol}_orders", f"amplitude of the {noun}"
         found.append(Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, of_revolution=True, measure=measure))
+    for end in "ab":
+        for rolling, exponent in EXPONENTS.items():
+            key, noun = f"bearing_{end}_{rolling}", f"equivalent load of {rolling}"
+            found.append(Kind(key, key, noun, "N", f"{_EQUIVALENT} {exponent}", borne, of_revolution=True, measure=F))
     found.append(
         Kind("loss", "loss", "loss", "W", _LOSS, (*pins, "") if mechanism.friction else (), of_revolution=True)
     )

@@ -172,6 +172,8 @@ class Mechanism(NamedTuple):
         What holds pins along their axes; without any, pins slide freely.
     friction : bool
         Whether pins rub in their holes.
+    unbalance : bool
+        Whether the last shaft has an unbalance.
     """
 
     name: str
@@ -185,6 +187,7 @@ class Mechanism(NamedTuple):
     cardan: tuple[str, ...] = ()
     faces: tuple[Face, ...] = ()
     friction: bool = False
+    unbalance: bool = False
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -286,6 +289,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "face_pair": [[pair.pin for pair in mechanism.pairs].index(face.pin) for face in mechanism.faces],
         "face_end": [face.end for face in mechanism.faces],
         "friction": mechanism.friction,
+        "unbalanced": mechanism.unbalance,
         "borne": [i for i, shaft in enumerate(mechanism.shafts) if shaft.borne],
         "first_filled": lumps + len(edges),
         "cardan": [member[name] for name in mechanism.cardan],

@@ -41,7 +41,7 @@ def mark_of(mechanism: Mechanism) -> str:
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump or bushing."""
     joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
-    lumps, bushings, shafts = len(mechanism.lump_kinds), len(mechanism.bushing_kinds), len(mechanism.shafts)
+    lumps, bushings = len(mechanism.lump_kinds), len(mechanism.bushing_kinds)
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
         Field("ahead", "rad", "angle of its input fork ahead of the output fork that drives it", shape=(joints,)),
@@ -103,7 +103,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "bearings of shafts: of the nearer and of the farther one, place along z of the shaft",
             shape=(sum(shaft.borne for shaft in mechanism.shafts), 2),
         ),
-        Field("unbalance", "kg*m", "unbalance of each shaft, along x and y of its frame", shape=(shafts, 2)),
+        Field("unbalance", "kg*m", "unbalance of the last shaft, along x and y of its frame", shape=(2,)),
         Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)

@@ -229,6 +229,11 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
+    if mechanism.unbalance:
+        fields += [
+            Field("shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
+            Field("shaft.unbalance_angle", "rad", "deviation of its direction"),
+        ]
     if mechanism.friction:
         fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
     for prefix in prefixes(mechanism) if mechanism.faces else ():

@@ -53,6 +53,28 @@ def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
     return np.asarray(theta + np.arctan2(advance, np.cos(theta) ** 2 * np.cos(alpha) + np.sin(theta) ** 2))
 
 
+def ratio_of_all(theta: ArrayLike, par: NDArray[np.void]) -> Array:
+    """Speed ratio of the last output shaft to the first input shaft, of a joint or of joints in series.
+
+    Parameters
+    ----------
+    theta : array_like
+        Input angle of the first joint, rad.
+    par : row of PARAM
+        The joints.
+
+    Returns
+    -------
+    ndarray
+    """
+    ratio, angle = np.ones(np.shape(theta)), np.asarray(theta, float)
+    for joint, alpha in enumerate(par["alpha"]):
+        if joint:
+            angle = output_angle(angle, par["alpha"][joint - 1]) + par["ahead"][joint]
+        ratio *= speed_ratio(angle, alpha)
+    return ratio
+
+
 def reversal_torque(params: NDArray[np.void]) -> Array:
     """Mean torque below which orders, or the inertia of the output shaft, reverse the load within a revolution.
 

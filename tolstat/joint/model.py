@@ -183,7 +183,7 @@ class Joint(Strict):
     @property
     def parts(self) -> tuple[str, ...]:
         """What the joint has beside lumps, bushings and pairs, `cardan.PARTS`."""
-        of = (self.thrust, self.friction.mu, self.shaft.input, self.shaft.output)
+        of = (self.thrust, self.friction.mu, self.shaft.input, self.shaft.output, self.shaft.unbalance)
         return tuple(part for part, given in zip(PARTS, of, strict=True) if given is not None)
 
     @property

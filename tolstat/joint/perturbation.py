@@ -212,6 +212,10 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         for i, face in enumerate(mechanism.faces):
             play = joint.thrust.end_play + errors[f"{face.name.removesuffix(face.name[-1])}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+    if joint.shaft.unbalance is not None:
+        size = joint.shaft.unbalance.size + errors["shaft.unbalance"]
+        angle = (joint.shaft.unbalance.angle or 0.0) + errors["shaft.unbalance_angle"]
+        params["unbalance"] = (size * np.array([np.cos(angle), np.sin(angle)])).T
     if joint.friction.mu is not None:
         params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params
@@ -241,11 +245,14 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "face_c": joint.thrust.c if joint.thrust else 0.0,
         "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
         "slip_speed": joint.friction.slip_speed,
-        "bearing_at": [
-            (sign * ends.bearings[0], sign * ends.bearings[1])
-            for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
-            if ends is not None
-        ],
+        "bearing_at": np.reshape(
+            [
+                sign * np.array(ends.bearings)
+                for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
+                if ends is not None
+            ],
+            (-1, 2),
+        ),
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
         "k_a": shaft.k_a,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
@@ -184,6 +184,35 @@ class Friction(Strict):
     """sliding speed over which friction rises"""
 
 
+class Unbalance(Strict):
+    """Unbalance of the output shaft, in the plane of the joint's centre: an amount, or a grade, mass and speed."""
+
+    amount: units.Unbalance | None = Field(default=None, examples=["1e-3 kg*m"])
+    """unbalance: mass times distance of its centre from the axis"""
+    grade: Annotated[units.Velocity, POSITIVE] | None = Field(default=None, examples=["16 mm/s"])
+    """balance quality grade G of ISO 21940-11: distance times angular velocity; its number is in mm/s"""
+    mass: units.Mass | None = Field(default=None, examples=["5 kg"])
+    """mass that the grade is for"""
+    speed: Annotated[units.Speed, POSITIVE] | None = Field(default=None, examples=["3000 rpm"])
+    """highest speed, which the grade is for"""
+    angle: units.Angle | None = Field(default=None, examples=["30 deg"])
+    """direction, from x of the output shaft towards y; when left out: any, the same for none, uniformly distributed"""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Unbalance:
+        of_grade = [self.grade, self.mass, self.speed]
+        if (self.amount is None) != (None not in of_grade) or (self.amount is not None and any(of_grade)):
+            raise refuse("needs amount, or grade, mass and speed, not both", "give one of the two")
+        return self
+
+    @property
+    def size(self) -> float:
+        """Unbalance, kg m."""
+        if self.grade is None or self.mass is None or self.speed is None:
+            return self.amount or 0.0
+        return self.grade * self.mass / self.speed
+
+
 class Shaft(Strict):
     """Output shaft, and what holds it along its axis; bearings of both shafts.
 
@@ -205,6 +234,8 @@ class Shaft(Strict):
     """bearings of the input shaft"""
     output: Ends | None = None
     """bearings of the output shaft"""
+    unbalance: Unbalance | None = None
+    """unbalance of the output shaft"""
 
     @field_validator("axial")
     @classmethod

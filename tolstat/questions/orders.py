@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from tolstat.analysis.sample import Sample
 from tolstat.common.columns import result_columns
-from tolstat.common.errors import NotApplicable
-from tolstat.common.load_kinds import ORDERS, kinds
-from tolstat.common.loads import FloatArray, load_of, loads_of
+from tolstat.common.errors import InputError, NotApplicable
+from tolstat.common.load_kinds import EXPONENTS, ORDERS, kinds
+from tolstat.common.loads import AT, FloatArray, load_of, loads_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
@@ -84,6 +86,8 @@ COLUMNS = (
     Column("interval of 95 %", values("q95_lower", "q95_upper"), shown=has("q95_lower"), rank=1),
 )
 """Columns of the table ``amplitudes``: quantiles over the joints with their intervals."""
+BEARING_COLUMNS = (Column("equivalent load", word("load")), *COLUMNS[1:])
+"""Columns of the table ``bearings``."""
 
 
 def orders(view: View, orbits: bool = False) -> Answer:
@@ -108,7 +112,9 @@ def orders(view: View, orbits: bool = False) -> Answer:
         Table ``amplitudes``, one row per quantity and order that the study keeps, SI: ``quantity``
         (``input.lateral``), ``noun``, ``order``, ``load`` (``input.lateral_2x``), ``unit``; ``nominal`` (NaN without a
         nominal joint); ``q5``, ``qmedian``, ``q95`` (amplitude that this share of the joints does not exceed), each
-        with ``_lower`` and ``_upper``, which are NaN for dependent samples; too few joints give 0 and infinity. With
+        with ``_lower`` and ``_upper``, which are NaN for dependent samples; too few joints give 0 and infinity. Table
+        ``bearings``, likewise, where the bearings of shafts are given: their equivalent loads over the duty cycle, by
+        shares of the revolutions, with exponent 3 for balls and 10/3 for rollers. With
         `orbits` table ``orbits``, one row per point: ``shaft``, ``near``, ``row``, ``point`` as in `Orbit`, ``theta``
         (input angle), ``f_x``, ``f_y``. Facts ``joints`` and ``left_out``: joints with and without a valid result,
         those pending not counted; ``origin`` and ``apart`` of the orbits, see `store.revolutions.Revolutions`.
@@ -132,6 +138,9 @@ def orders(view: View, orbits: bool = False) -> Answer:
     rows = [_amplitude(view, name) for name in sorted(names, key=lambda name: in_order.index(kind_of[name].key))]
     facts: dict[str, Any] = {"joints": joints, "left_out": view.counts.done - joints}
     parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
+    bearings = _bearings(view)
+    if bearings:
+        parts.append(Table("bearings", "Equivalent loads of the shafts' bearings", BEARING_COLUMNS, bearings))
     notes = [f"{joints} joints, {facts['left_out']} without a valid load left out"]
     if has("q95_lower")(rows):
         notes[0] += "; 95 % intervals"
@@ -169,14 +178,39 @@ def are_asked(view: View) -> bool:
 
 def _amplitude(view: View, name: str) -> Row:
     """One row of the table ``amplitudes``."""
-    load, (quantity, _, order) = view.load(name), name.removesuffix("x").rpartition("_")
+    quantity, _, order = name.removesuffix("x").rpartition("_")
     noun = load_of(name, view.mechanism).kind.noun
-    row = {"quantity": quantity, "noun": noun, "order": int(order), "load": name, "unit": load.unit}
-    row["nominal"] = load.nominal
+    return {"quantity": quantity, "noun": noun, "order": int(order), **_quantiles(view.load(name))}
+
+
+def _quantiles(load: Sample) -> Row:
+    row = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
     for key, share in SHARES.items():
-        amplitude = load.quantile(share)
-        row |= with_ends(key, (amplitude.estimate, max(amplitude.lower, 0.0), amplitude.upper))
+        quantile = load.quantile(share)
+        row |= with_ends(key, (quantile.estimate, max(quantile.lower, 0.0), quantile.upper))
     return row
+
+
+def _bearings(view: View) -> Rows:
+    """Rows of the table ``bearings``: equivalent loads over the duty cycle, each point by its share of the turns.
+
+    Where the study gives no shares, there is a row for each operating point.
+    """
+    keys = {f"bearing_{end}_{rolling}": exponent for end in "ab" for rolling, exponent in EXPONENTS.items()}
+    exponent_of = {load.name: keys.get(load.kind.key) for load in loads_of(view.mechanism).values()}
+    names = [name for name in view.kept_loads if exponent_of[name]]
+    of_points = [f"{AT}{point}" for point in view.points] if len(view.points) > 1 else [""]
+    try:
+        share = view.shares_of_revolutions if names else np.ones(1)
+    except InputError:
+        return [_quantiles(view.load(f"{name}{at}")) for name in names for at in of_points]
+    rows = []
+    for name in names:
+        p, each = float(Fraction(exponent_of[name] or 1)), [view.load(f"{name}{at}") for at in of_points]
+        nominal = (share @ np.array([load.nominal for load in each]) ** p) ** (1 / p)
+        values = (share @ np.array([load.values for load in each]) ** p) ** (1 / p)
+        rows.append(_quantiles(Sample.of(values, view.status, view.design, name, "N", float(nominal))))
+    return rows
 
 
 def _orbits(view: View) -> tuple[list[list[Orbit]], str, float]:

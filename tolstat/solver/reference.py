@@ -94,8 +94,7 @@ def first_order(
     """
     from tolstat.kernel.integrators import first_order as kernel
     from tolstat.kernel.mechanics.work import work_dtype
-    from tolstat.kernel.revolution.orders import write_orders
-    from tolstat.kernel.revolution.settle import make_samples, sample
+    from tolstat.kernel.revolution.settle import make_samples, sample, write_of_revolution
     from tolstat.kernel.simd.jit import compiled_entry
 
     par = params.view(np.recarray)[0]
@@ -132,7 +131,7 @@ def first_order(
         samples = make_samples(1, len(times), mechanism)[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
         out = tables.for_kernels(np.zeros(1, tables.tables(mechanism).RESULT), mechanism)[0]
-        write_orders(par, samples if equal is None else samples[equal], out)
+        write_of_revolution(par, samples if equal is None else samples[equal], out)
         out.largest[: samples.loads.shape[1]] = samples.loads.max(axis=0)
         return np.array(out.largest)
 

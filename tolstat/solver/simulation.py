@@ -107,7 +107,8 @@ def simulate_rows(
         run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows, mechanism)
         for i, samples in run:
             if out[i].status in SIMULATED:
-                for name, values in extracted(samples, histories, specs, mechanism).items():
+                on_grid = samples[:: settings.steps_per_rev // options.steps_per_rev]
+                for name, values in extracted(on_grid, histories, specs, mechanism).items():
                     recorded[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
@@ -145,7 +146,7 @@ def simulate_together(
     """
     blocks = blank_results((0, 0), mechanism) if blocks is None else blocks
     if options.fidelity == Fidelity.IDEAL:
-        yield from _ideal(params, options, keep, results)
+        yield from _ideal(params, options, keep, results, mechanism)
         return
     from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import START_ONLY
@@ -230,13 +231,13 @@ def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism
 
 
 def _ideal(
-    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
+    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void], mechanism: Mechanism
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`."""
     from tolstat.kernel.revolution.ideal import ideal_revolution
 
-    batch, rows, out = lanes(options, 1, CARDAN), params.view(np.recarray), tables.for_kernels(results, CARDAN)
-    at_rest = np.zeros(CARDAN.dof)
+    batch, out = lanes(options, 1, mechanism), tables.for_kernels(results, mechanism)
+    rows, at_rest = params.view(np.recarray), np.zeros(mechanism.dof)
     for i in range(len(params)):
         ideal_revolution(rows[i], options, at_rest, batch.scratch, batch.samples[0], batch.notes[0], out[i])
         if keep:

@@ -27,12 +27,12 @@ from tolstat.study.selection import halves, toleranced_units
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits
 
-SETTABLE = ("joint", "operation", "series", "errors")
+SETTABLE = ("joint", "operation", "errors")
 """Sections whose keys are changed, beside ``tolerances``, whose name is left out."""
 EXAMPLE = 'write --set "*.tilt_*.cpk=1.2", --set joint.contact.law=sliced or --set "operation.alpha=12 deg"'
 NONE = "none"
 """Value that takes an error out of the tolerances."""
-OTHERS = "joint, operation, errors and tolerances change the joints; edit the study for others, and run it"
+OTHERS = f"{', '.join(SETTABLE)} and tolerances change the joints; edit the study for others, and run it"
 DIGITS = 10
 """Significant digits of numbers that are compared: conversions of units agree in more."""
 NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
@@ -202,10 +202,8 @@ def _parsed(setting: str, place: str, mechanism: Mechanism) -> tuple[list[str], 
 
 
 def _set(text: str, path: Sequence[str], value: Any, place: str, mechanism: Mechanism) -> str:
-    """Set a key of the joint, of an operating point, of joint 2 of two in series or of a fixed error."""
+    """Set a key of the joint, of an operating point or of a fixed error."""
     section = tomllib.loads(text).get(path[0])
-    if path[0] == "series" and section is None:
-        raise input_error(place, "is in section 'series', which the study lacks", OTHERS)
     if path[0] == "operation" and isinstance(section, list):
         names = [str(point.get("name")) for point in section]
         if len(path) <= NAMES or path[1] not in names:

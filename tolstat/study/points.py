@@ -28,6 +28,15 @@ from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
+IDEAL_WITH_FRICTION = (
+    "'ideal' does not hold with friction, which its closed forms leave out",
+    'write "quasistatic" or "dynamic"',
+)
+IDEAL_IN_SERIES = (
+    "'ideal' does not hold in series: its closed forms are those of one joint",
+    'write "quasistatic" or "dynamic"',
+)
+"""Fault of joints in series, and the remedy."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -234,6 +243,7 @@ def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
 
 
 FORCE = "operation.axial_force"
+_DIRECTION = "shaft.unbalance_angle"
 Varied = Mapping[str, Collection[str]]
 
 
@@ -261,7 +271,7 @@ class Setting(NamedTuple):
 
 
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
-    """Refuse axial forces and swings without effect, and closed forms where an axial force moves the output shaft.
+    """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
     In series, refuse what only one joint can have.
 
@@ -270,7 +280,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     settings : sequence of Setting
         All joints of a study at all of their operating points.
     varied : mapping
-        Errors of the operating point that scatter or are swept, to the sections of the study in which they do.
+        Errors of operating point and shaft that scatter or are swept, to the sections of the study in which they do.
 
     Yields
     ------
@@ -290,6 +300,16 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
+    if any(setting.fidelity == "ideal" and setting.joint.friction.mu is not None for setting in settings):
+        yield ("solver", "fidelity"), *IDEAL_WITH_FRICTION
+    for part in {part for one in settings for part in one.joint.parts}:
+        if not all(part in setting.joint.parts for setting in settings):
+            found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
+            yield ("joint",), found, "give it to all of them, or to none"
+    of_shafts = [setting.joint.shaft.unbalance for setting in settings]
+    if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in of_shafts):
+        remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
+        yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
     for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
         found = "stands beside [series]: both joints are simulated, none stands for the other"
         yield path, found, "remove it, or [series]"
@@ -297,8 +317,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         found = "is not rigid: in series, tube and shafts are held on their axes, along and across"
         yield ("joint", "shaft", "axial"), found, 'write "rigid", or remove [series]'
     if any(setting.fidelity == "ideal" for setting in in_series):
-        found = "'ideal' does not hold in series: its closed forms are those of one joint"
-        yield ("solver", "fidelity"), found, 'write "quasistatic" or "dynamic"'
+        yield ("solver", "fidelity"), *IDEAL_IN_SERIES
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:

@@ -22,6 +22,7 @@ from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
+from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.simd.jit import njit
 
 NONE, ONE_POINT = int(Mode.NONE), int(Mode.ONE_POINT)
@@ -88,6 +89,8 @@ def ideal_loads(phase, at_rest, par, work):
         touch(pin, radius, force, par, work)
     for i in range(8):
         carry(i, par, work)
+    for face in range(par.face_pair.shape[0]):
+        work.face[face, FORCE] = 0.0
 
 
 @njit

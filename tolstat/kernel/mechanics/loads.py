@@ -12,7 +12,8 @@ from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
 (FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE, THRUST, NEAR, FAR) = range(11)
-LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS, LOSS = range(11, 18)
+LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS = range(11, 17)
+NEAR_BALLS, NEAR_ROLLERS, FAR_BALLS, FAR_ROLLERS, LOSS = range(17, 22)
 """Kinds, in the order of `load_kinds.all_kinds`; ``par.begin`` has the first element of each."""
 OF_FORCES, OF_TORQUES = range(2)
 """Measures, whose largest load changes are relative to: rows of ``par.measured`` and ``par.of_measure``."""
@@ -22,8 +23,8 @@ OF_FORCES, OF_TORQUES = range(2)
 def shaft_load(shaft, par, work):
     """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
 
-    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a. Its unbalance adds to
-    the force across.
+    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a. Across it, its
+    unbalance adds to the force.
 
     Parameters
     ----------
@@ -39,10 +40,10 @@ def shaft_load(shaft, par, work):
         s, rate = work.pos[body, 2], work.vel[body, 2]
         z = where(par.slides > 0, par.k_a * s + par.c_a * rate - par.F_a, z)
         m_x, m_y = m_x - s * y, m_y + s * x
-    if par.borne.shape[0] > 0:
+    if par.unbalanced == 1 and shaft == par.turn.shape[0] - 1:
         speed = work.frame_w[par.frame[body], 2]
-        x += par.unbalance[shaft, 0] * speed * speed
-        y += par.unbalance[shaft, 1] * speed * speed
+        x += par.unbalance[0] * speed * speed
+        y += par.unbalance[1] * speed * speed
     return (x, y, z), (m_x, m_y, m_z)
 
 

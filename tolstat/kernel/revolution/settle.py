@@ -13,7 +13,7 @@ from tolstat.kernel.mechanics.loads import LOSS, OF_FORCES, OF_TORQUES, complete
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
-from tolstat.kernel.revolution.bearing import write_equivalent_loads
+from tolstat.kernel.revolution.bearing import write_bearings, write_equivalent_loads
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
@@ -283,7 +283,14 @@ def summarise(par, samples, out):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par, samples, out)
+    write_of_revolution(par, samples, out)
+
+
+@njit
+def write_of_revolution(par, samples, out):
+    """Write the loads that belong to a whole revolution, the recorded one, to a row of KERNEL_RESULT."""
     write_orders(par, samples, out)
+    write_bearings(par, samples, out)
     if par.friction == 1:
         write_losses(par, samples, out)
 

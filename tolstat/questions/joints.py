@@ -344,8 +344,8 @@ def error_note(verification: Verification, mechanism: Mechanism, limits: Iterabl
     total = [row for row in error_rows(verification, mechanism) if row["error"] == TOTAL]
     shown = [row for row in total if row["load"] in limited or kinds(mechanism)[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
-    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in kinds(mechanism).values()}
-    words = [f"{called[row['load']]} {row['median']:.1e}, at worst {row['worst']:.1e}" for row in known]
+    called = [called_for_people(row["load"], mechanism) for row in known]
+    words = [f"{name} {row['median']:.1e}, at worst {row['worst']:.1e}" for name, row in zip(called, known, strict=True)]
     noun = "error of numerics and fidelity" if comparison.FIDELITY in verification.checks else "numerical error"
     base = verification.base["status"] == Status.OK
     lost = {"": int((~base).sum())}  # joints that failed or did not settle, in the campaign and in each check
@@ -353,6 +353,12 @@ def error_note(verification: Verification, mechanism: Mechanism, limits: Iterabl
         lost[f" in {name}"] = int((base & (check.results["status"] != Status.OK)).sum())
     unsettled = ", ".join(f"{count} not settled{where}" for where, count in lost.items() if count)
     return f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}{f'; {unsettled}' if unsettled else ''}"
+
+
+def called_for_people(key: str, mechanism: Mechanism) -> str:
+    """Name of a kind of loads in sentences: its symbol where tables have that beside every load, or else its noun."""
+    kind = kinds(mechanism)[key]
+    return kind.symbol if kind.shown or kind.key == "psi" else kind.noun
 
 
 def basis(verification: Verification) -> str:

@@ -202,7 +202,8 @@ def scene(view: View) -> tuple[str, str]:
     def marked(words: str, key: str) -> str:
         if assumed is None:
             return words
-        return f"{words} ({'assumed' if any(name.startswith(key) for name in assumed) else 'given'})"
+        found = any(name == key or (key.endswith(".") and name.startswith(key)) for name in assumed)
+        return f"{words} ({'assumed' if found else 'given'})"
 
     first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
     second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."
@@ -234,9 +235,9 @@ def joint_values(store: Reader) -> Listing:
 def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
     values: dict[str, str] = {}
-    units_of = derived.UNITS | quantities(Joint)
+    units_of = derived.UNITS | quantities(Joint) | {f"shaft.{end}.bearings": "m" for end in ("input", "output")}
     for key, value in leaves(joint.model_dump(exclude=set(model.TOLD))).items():
-        if isinstance(value, (float, tuple)):
+        if isinstance(value, (float, list)):
             unit = units_of.get(key, "1")
             like = examples().get(key, units.EXAMPLES[unit])
             like = like[0] if isinstance(like, list) else like
@@ -334,6 +335,6 @@ def _basis(view: View) -> list[Verdict]:
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
-        label = f"numerical error of the largest loads ({kind})"
+        label = f"numerical error of the largest loads ({joints.called_for_people(kind, view.mechanism)})"
         cards.append(Verdict("", joints.in_percent(usual[kind]), label, (joints.basis(view.verification),)))
     return cards

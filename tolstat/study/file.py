@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolstat.common.cardan import MECHANISMS, named
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, collected, gather, input_error, raise_all
 from tolstat.common.loads import load_of, loads_of, split, units_of_limits
@@ -55,9 +54,7 @@ def _joint(file: Reading) -> Joint | None:
         return None
     if file.fit is not None and isinstance(keys["base"], str):
         keys = _with_diameters(file, keys)
-    joint = reading.load(keys["base"], keys, file.place, file.folder)
-    file.mechanism = MECHANISMS[named(file.mechanism, joint.parts)]
-    return joint
+    return reading.load(keys["base"], keys, file.place, file.folder)
 
 
 def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:

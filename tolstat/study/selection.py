@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
-from tolstat.common.cardan import CARDAN, SERIES
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
@@ -257,8 +257,6 @@ class Reading:
         What stands before the key path in the place of a fault.
     faults : list of Fault
         Those found so far.
-    mechanism : Mechanism
-        What it is about.
     claims : Assignments
         Entries that set errors.
     parts : dict
@@ -275,9 +273,8 @@ class Reading:
         self._source, self._has_lines = read_text(path) if text is None else text, text is None
         self.text, self.data = self._source, read_toml(path, self._source)
         self.faults: list[Fault] = []
-        self.mechanism = SERIES if "series" in self.data else CARDAN
-        self.claims = Assignments(self.place, self.mechanism)
         self.parts: dict[str, Any] = {"signals": ()}
+        self.claims = Assignments(self.place, self.mechanism)
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
             raise input_error(self.place, "is a joint file, not a study or case", remedy)
@@ -291,6 +288,12 @@ class Reading:
 
     def __getattr__(self, name: str) -> Any:
         return self.parts.get(name)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What it is about; while no joint is read, with all that a joint may have."""
+        joint = self.parts.get("joint")
+        return MECHANISMS[named(SERIES if "series" in self.data else CARDAN, joint.parts if joint else PARTS)]
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

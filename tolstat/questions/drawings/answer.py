@@ -136,7 +136,7 @@ def _errors_of(joint: joints.Joint, errors: NDArray[np.void], title: str, key: s
     """Drawing of the errors of each Cardan joint of one mechanism."""
     panels = []
     for before in views.joints_in(errors.dtype):
-        name, own = before.rstrip("."), views.errors_in(errors, before)
+        name, own = before.rstrip("."), views.errors_in(joint, errors, before)
         of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
         panels.append(views.errors_of(joint, own, f"{of}{title}", f"{key}{suffix}"))
     return panels
@@ -256,7 +256,7 @@ def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
     """Errors of each pin and hole of one joint, see `views.numbers`; names as in `errors`."""
     rows = list[Row]()
     for before in views.joints_in(errors.dtype):
-        own = views.numbers(joint, views.errors_in(errors, before))
+        own = views.numbers(joint, views.errors_in(joint, errors, before))
         rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
     return rows
 

@@ -17,7 +17,7 @@ from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
-from tolstat.joint import Joint, Operation, nominal_errors, perturb, perturbation
+from tolstat.joint import Joint, Operation, mechanism_of, nominal_errors, perturb, perturbation
 
 Array = NDArray[np.float64]
 Place = Array | tuple[float, float]
@@ -53,6 +53,7 @@ ON_CROSS: Look = {"facecolor": CROSS, "edgecolor": "none", "pad": 1.0}
 HEIGHT = 1.6
 """Height of a pin in its hole with what is written above it, inches."""
 X, Y = np.eye(2)
+AT_REST = Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0)
 
 
 class Feature(NamedTuple):
@@ -87,9 +88,14 @@ def joints_in(table: np.dtype[np.void]) -> list[str]:
     return [name.removesuffix(first) for name in table.names or () if name.endswith(first)]
 
 
-def errors_in(errors: NDArray[np.void], before: str) -> NDArray[np.void]:
-    """Errors of a Cardan joint of one mechanism, (1,) table ERROR of `CARDAN`; `before` as of `joints_in`."""
-    of_joint = nominal_errors(1, CARDAN)
+def no_errors(joint: Joint) -> NDArray[np.void]:
+    """A joint without errors, (1,) table ERROR of the joint by itself."""
+    return nominal_errors(1, mechanism_of(joint, AT_REST))
+
+
+def errors_in(joint: Joint, errors: NDArray[np.void], before: str) -> NDArray[np.void]:
+    """Errors of a Cardan joint of one mechanism, (1,) table ERROR as of `no_errors`; `before` as of `joints_in`."""
+    of_joint = no_errors(joint)
     for name in of_joint.dtype.names or ():
         of_joint[name] = errors[f"{before}{name}" if f"{before}{name}" in (errors.dtype.names or ()) else name]
     return of_joint
@@ -102,10 +108,10 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     ----------
     joint : Joint
         The nominal joint.
-    errors : ndarray, shape (1,), dtype ERROR of `CARDAN`
+    errors : ndarray, shape (1,), dtype ERROR as of `no_errors`
         Its errors.
     """
-    par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
+    par = perturb(joint, AT_REST, errors)[0]
     pairs_of_joint = []
     for i, (pair, number) in enumerate(zip(CARDAN.pairs, HOLE_OF_PIN, strict=True)):
         t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[number - 1]
@@ -118,7 +124,7 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
 
 def positive(joint: Joint, kind: str) -> Pair:
     """Pin 1 and hole 4, both with a positive error of one kind, large enough to be drawn as it is."""
-    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), nominal_errors(1, CARDAN)
+    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), no_errors(joint)
     sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
     for name in CARDAN.pairs[0][:2]:
         errors[f"{name}.{kind}"] = sizes[kind.partition("_")[0]]
@@ -167,7 +173,7 @@ def kinds_of_errors(joint: Joint) -> Panel:
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     solid: Look = {"edgecolor": COLOURS[0]}
     dashed: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none"}
-    cells, ideal = list[Cell](), pairs(joint, nominal_errors(1, CARDAN))[0]
+    cells, ideal = list[Cell](), pairs(joint, no_errors(joint))[0]
     for kind, meaning in MEANINGS.items():
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
         both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}

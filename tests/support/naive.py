@@ -168,6 +168,34 @@ def stations_of(p, now, par, mechanism):
     return stations
 
 
+def face_of(i, now, par, mechanism):
+    """Thrust face i: where the end of the pin is, direction in which the hole stops it, penetration, pressing force."""
+    face = mechanism.faces[i]
+    p = [pair.pin for pair in mechanism.pairs].index(face.pin)
+    pin, hole = (mechanism.bodies.index(name) for name in (face.pin, mechanism.pairs[p].hole))
+    position, attitude = now.bodies
+    end = position[pin] + attitude[pin] @ (par.pin_point[p] + par.face_at[i, 0] * par.pin_axis[p])
+    stop = position[hole] + attitude[hole] @ (par.hole_point[p] + par.face_at[i, 1] * par.hole_axis[p])
+    inwards = -face.end * attitude[hole] @ par.hole_axis[p]
+    delta = (stop - end) @ inwards
+    approach = (velocity_at(end, hole, now) - velocity_at(end, pin, now)) @ inwards
+    pressing = par.face_k * delta + par.face_c * smooth_step(delta / par.delta_d) * approach
+    return end, inwards, delta, max(0.0, pressing) if delta > 0 else 0.0
+
+
+def rubbing_of(p, now, par, mechanism):
+    """Friction on the pin of pair p at each station that presses: point, force, power that is lost."""
+    pin, hole = (mechanism.bodies.index(name) for name in (mechanism.pairs[p].pin, mechanism.pairs[p].hole))
+    found = []
+    for point, n, _, pressing, _ in stations_of(p, now, par, mechanism):
+        surface = point + par.friction_radius * n
+        w = velocity_at(surface, pin, now) - velocity_at(surface, hole, now)
+        w = w - (w @ n) * n
+        force = -par.mu * pressing * w / np.sqrt(w @ w + par.slip_speed**2)
+        found.append((surface, force, -force @ w))
+    return found
+
+
 def velocity_at(point, body, now):
     """Velocity of a point that moves with a body."""
     return now.velocity[body] + np.cross(now.spin[body], point - now.bodies.position[body])
@@ -203,11 +231,17 @@ class Loads(NamedTuple):
         On the lump, along its triad in the base.
     modes : list of str
         Contact mode of each pin.
+    thrust : ndarray, shape (faces,)
+        Force of each thrust face.
+    loss : ndarray, shape (pairs,)
+        Power that the friction of each pin takes; 0 where pins do not rub.
     """
 
     force: np.ndarray
     bushing: np.ndarray
     modes: list[str]
+    thrust: np.ndarray
+    loss: np.ndarray
 
 
 def forces(t, q, v, par, mechanism=CARDAN):
@@ -241,13 +275,24 @@ def loads_between(now, par, mechanism):
         apply(base, -f, -torque, marker)
         loads.append(load)
 
+    def act(pair, f, point):
+        apply(mechanism.bodies.index(pair.pin), f, np.zeros(3), point)
+        apply(mechanism.bodies.index(pair.hole), -f, np.zeros(3), point)
+
+    loss = np.zeros(len(mechanism.pairs))
     for p, pair in enumerate(mechanism.pairs):
         stations = stations_of(p, now, par, mechanism)
         modes.append(contact_mode([(n, delta) for _, n, delta, _, _ in stations]))
         for point, _, _, _, f in stations:
-            apply(mechanism.bodies.index(pair.pin), f, np.zeros(3), point)
-            apply(mechanism.bodies.index(pair.hole), -f, np.zeros(3), point)
-    return Loads(force, np.array(loads), modes)
+            act(pair, f, point)
+        for point, f, power in rubbing_of(p, now, par, mechanism) if mechanism.friction else ():
+            act(pair, f, point)
+            loss[p] += power
+    faces = [face_of(i, now, par, mechanism) for i in range(len(mechanism.faces))]
+    pair_of = {pair.pin: pair for pair in mechanism.pairs}
+    for face, (point, inwards, _, pressing) in zip(mechanism.faces, faces, strict=True):
+        act(pair_of[face.pin], pressing * inwards, point)
+    return Loads(force, np.array(loads), modes, np.array([pressing for *_, pressing in faces]), loss)
 
 
 def inertias(attitude, par, mechanism):

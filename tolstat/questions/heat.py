@@ -63,7 +63,9 @@ def heat(view: View) -> Answer:
     if "loss" not in view.kept_loads or not view.count(*VALID):
         remedy = "give the joint friction.mu, and let [output] results of the study keep the losses"
         raise inapplicable(view, "holds no losses of valid joints", remedy)
-    rows = [{"point": part.points[0]} | row for part in view.parts for row in (*_losses(part), _efficiency(part))]
+    rows: Rows = [
+        {"point": part.points[0], **row} for part in view.parts for row in (*_losses(part), _efficiency(part))
+    ]
     table = Table("heat", "Loss and efficiency", COLUMNS, rows)
     return Answer("heat", "Heat of the bearings", [table, Sentence(MEANING), Sentence(LEFT_OUT)])
 

@@ -345,7 +345,9 @@ def error_note(verification: Verification, mechanism: Mechanism, limits: Iterabl
     shown = [row for row in total if row["load"] in limited or kinds(mechanism)[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
     called = [called_for_people(row["load"], mechanism) for row in known]
-    words = [f"{name} {row['median']:.1e}, at worst {row['worst']:.1e}" for name, row in zip(called, known, strict=True)]
+    words = [
+        f"{name} {row['median']:.1e}, at worst {row['worst']:.1e}" for name, row in zip(called, known, strict=True)
+    ]
     noun = "error of numerics and fidelity" if comparison.FIDELITY in verification.checks else "numerical error"
     base = verification.base["status"] == Status.OK
     lost = {"": int((~base).sum())}  # joints that failed or did not settle, in the campaign and in each check

@@ -62,7 +62,7 @@ def in_hole(pin, lever, par, work):
 
 @njit
 def push(pin, point, f_hole, par, work):
-    """Add the force `f_hole` at `point` to the hole of a pin, and its opposite to the pin; in axes of the hole's member."""
+    """Add the force `f_hole` at `point` to the pin's hole, its opposite to the pin; in axes of the hole's member."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     accumulate(work.force, hole, f_hole, cross(sub(point, row(work.pos, hole)), f_hole))
     f_pin = scale(-1.0, to_pin(hinge, f_hole, par, work))

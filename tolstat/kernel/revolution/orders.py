@@ -35,7 +35,10 @@ def plus(total, value, c, s):
 
 @njit
 def bearing_sums(j, fx, fy, mx, my, par):
-    """Sums of the loads of both bearings of shaft ``par.borne[j]`` from those of force, `fx`, `fy`, and moment, `mx`, `my`."""
+    """Sums of the loads of both bearings of shaft ``par.borne[j]``, from those of its force and moment.
+
+    `fx`, `fy`, `mx`, `my`: of their components, N and N m.
+    """
     (near_xc, far_xc), (near_xs, far_xs) = bearing_loads(j, fx[0], my[0], par), bearing_loads(j, fx[1], my[1], par)
     (near_yc, far_yc), (near_ys, far_ys) = bearing_loads(j, fy[0], -mx[0], par), bearing_loads(j, fy[1], -mx[1], par)
     return (near_xc, near_xs), (near_yc, near_ys), (far_xc, far_xs), (far_yc, far_ys)

@@ -43,6 +43,7 @@ _USUAL: dict[str, tuple[str, dict[str, float]]] = {
     "1/m^2": ("2.5 MPa/kN", {"MPa/kN": 1e3}),
     "1/m^3": ("0.2 MPa/(N*m)", {"MPa/Nm": 1e6, "MPa/(N*m)": 1e6}),
     "kg": ("0.32 kg", {"kg": 1.0, "g": 1e-3}),
+    "kg*m": ("1e-3 kg*m", {"kg*m": 1.0, "g*mm": 1e-6}),
     "kg*m^2": ("0.01 kg*m^2", {"kg*m^2": 1.0}),
     "kg/m^3": ("7700 kg/m^3", {"kg/m^3": 1.0}),
     "1": ("0.5", {"": 1.0, "%": 1e-2, "ppm": 1e-6}),

@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 from tests import study_reference
+from tests.study_reference import WHOLE
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import (
@@ -31,6 +32,7 @@ SCHEMA = DOCS / "schemas" / "schema.md"
 PAGE = """# Columns of a result file of schema {version}
 
 Datasets of the groups `/errors` and `/results`; what they are about is in [the result file](../result_format.md).
+Of faces, bearings of shafts, losses and unbalance a file has those that its joint has.
 
 ## `/errors`
 
@@ -102,7 +104,7 @@ def documents() -> dict[Path, str]:
     parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS, "origin subset": origin}
     content = {name: field_table(columns) for name, columns in parts.items()}
     content |= {"status": status_table(), "session": session_table(), "axes": axis_table()}
-    page = {"errors": field_table(error_columns(CARDAN)), "results": field_table(result_columns(CARDAN))}
+    page = {"errors": field_table(error_columns(WHOLE)), "results": field_table(result_columns(WHOLE))}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
         MODEL: updated(MODEL.read_text(encoding="utf-8"), {"derived": derived_table()}),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from tolstat.common.cardan import CARDAN
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, named
 from tolstat.common.columns import optional_columns
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import loads_of, units_of_limits
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
@@ -26,6 +27,16 @@ from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
+WHOLE = MECHANISMS[named(CARDAN, PARTS)]
+"""The joint with all that it may have."""
+GIVEN_BY = dict(
+    zip(
+        PARTS,
+        ("[thrust]", "friction.mu", "shaft.input.bearings", "shaft.output.bearings", "shaft.unbalance"),
+        strict=True,
+    )
+)
+"""What of a joint file gives each of `PARTS`."""
 BAND = tuple(key for key in Banded.model_fields if key not in SingleEntry.model_fields)
 ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
@@ -68,7 +79,7 @@ def kind(own: Mapping[str, Any]) -> str:
         return "quantity" if own["x-table"] == "quantity" else "number or table" if "anyOf" in own else "table"
     if own.get("type") == "array":
         inner = _first(own) or own["items"]
-        number = "three " if "prefixItems" in own else ""
+        number = {2: "two ", 3: "three "}.get(len(own.get("prefixItems", ())), "")
         return f"list of {number}{kind(inner).partition(',')[0]}s".replace("quantitys", "quantities")
     if "x-unit" in own and own["x-unit"] != "1":
         return f"quantity{bounds}"
@@ -92,6 +103,13 @@ def model_table(model: Any) -> str:
     """Table of the keys of a model."""
     made = of_model(model)
     return key_table(made["properties"], made.get("required", ()))
+
+
+def given_by(name: str, names_of: Callable[[Mechanism], Iterable[str]]) -> str:
+    """What gives the joint an error or load: empty where each joint has it."""
+    if name in names_of(CARDAN):
+        return ""
+    return next(f"`{key}`" for part, key in GIVEN_BY.items() if name in names_of(MECHANISMS[named(CARDAN, [part])]))
 
 
 def _own(model: Any, base: Any) -> dict[str, Any]:
@@ -156,9 +174,9 @@ def zones() -> str:
 
 def errors() -> str:
     """Table of the names of errors."""
-    lines = ["| name | unit | meaning |", "|---|---|---|"]
+    lines = ["| name | unit | meaning | needs |", "|---|---|---|---|"]
     meanings: dict[tuple[str, str, str], list[str]] = {}
-    for field in tables_of(CARDAN).error_fields:
+    for field in tables_of(WHOLE).error_fields:
         feature, _, half = field.name.partition(".")
         text = field.description.replace("the pin's", "the").replace("the pin axis", "the axis")
         text = text.replace("the hole's", "the").replace("the hole axis", "the axis")
@@ -166,26 +184,28 @@ def errors() -> str:
     for (half, unit, text), features in meanings.items():
         first, last = features[0], features[-1]
         names = f"`{first}.{half}`" + (f" … `{last}.{half}`" if last != first else "")
-        lines.append(f"| {names} | {'' if unit == '1' else unit} | {text} |")
+        needed = given_by(f"{first}.{half}", lambda mechanism: (f.name for f in tables_of(mechanism).error_fields))
+        lines.append(f"| {names} | {'' if unit == '1' else unit} | {text} | {needed} |")
     return "\n".join(lines)
 
 
 def loads() -> str:
     """Table of the loads that can have a limit."""
-    lines = ["| load | unit | meaning |", "|---|---|---|"]
-    for of in kinds(CARDAN).values():
-        names = [name for name in units_of_limits(CARDAN) if loads_of(CARDAN)[name].kind == of]
+    lines = ["| load | unit | meaning | needs |", "|---|---|---|---|"]
+    for of in kinds(WHOLE).values():
+        names = [name for name in units_of_limits(WHOLE) if loads_of(WHOLE)[name].kind == of]
         if not names:
             continue
         text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
-        lines.append(f"| {text} | {'' if of.unit == '1' else of.unit} | largest {of.meaning} |")
+        needed = ", ".join(dict.fromkeys(filter(None, (given_by(name, loads_of) for name in names))))
+        lines.append(f"| {text} | {'' if of.unit == '1' else of.unit} | largest {of.meaning} | {needed} |")
     return "\n".join(lines)
 
 
 def results() -> str:
     """Sentence with the names of the result columns that can be left out."""
     found: dict[str, list[str]] = {}
-    for column in optional_columns(CARDAN):
+    for column in optional_columns(WHOLE):
         found.setdefault(column.field, []).append(column.name)
     return (
         "Columns: "

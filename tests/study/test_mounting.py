@@ -10,11 +10,12 @@ import pytest
 from tests.support.of_cardan import without_results
 from tolstat import sampling, study
 from tolstat.campaign import remedy
+from tolstat.common.cardan import MECHANISMS
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation
 from tolstat.joint import operating, perturb
 from tolstat.solver import fidelity
-from tolstat.study.points import note_on_shafts
+from tolstat.study.points import note_on_pins, note_on_shafts
 
 HEAD = """[joint]
 base = "cirelli2021"
@@ -193,3 +194,10 @@ def test_a_note_where_rigid_shafts_decide() -> None:
     assert not note_on_shafts(["pin1.offset_t", "hole1.tilt_z"], ["rigid"], "x")
     assert not note_on_shafts(["pin1.offset_z"], ["rigid", "free"], "x")
     assert not note_on_shafts(["pin1.offset_z"], [2e7], "x")
+
+
+def test_a_note_where_nothing_holds_pins_along_their_holes() -> None:
+    free, held = MECHANISMS["cardan+friction"], MECHANISMS["cardan+thrust+friction"]
+    assert "without thrust faces" in note_on_pins(["pin1.offset_t", "hole3.offset_e"], free)
+    assert not note_on_pins(["pin1.offset_t", "hole1.position_inner"], free)
+    assert not note_on_pins(["pin1.offset_t", "hole3.offset_e"], held)

@@ -42,6 +42,8 @@ def plan(
     """
     loaded = library.studies.load(study_file, n=n)
     print_study_notes(study_file, loaded)
+    if note := library.points.note_on_pins(loaded.tolerances, loaded.mechanism):
+        say(f"note: {note}")
     library.compilation.announce()
     with progress() as shown:
         prediction = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)

@@ -67,7 +67,7 @@ class Joint(Strict):
     hub: Hub = Field(default=Hub(), validate_default=True)
     shaft: Shaft
     thrust: Thrust | None = None
-    """Thrust faces; without the table pins slide freely along their holes"""
+    """Thrust faces, which hold the cross along its pins; without this table pins slide freely along their holes"""
     friction: Friction = Friction()
     bushing: Bushing
     contact: Contact

@@ -231,11 +231,11 @@ class Shaft(Strict):
     """what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose bearing; or the
     stiffness of the bearings of both shafts in series"""
     input: Ends | None = None
-    """bearings of the input shaft"""
+    """Bearings of the input shaft, whose loads become known"""
     output: Ends | None = None
-    """bearings of the output shaft"""
+    """Bearings of the output shaft, whose loads become known"""
     unbalance: Unbalance | None = None
-    """unbalance of the output shaft"""
+    """Unbalance of the output shaft"""
 
     @field_validator("axial")
     @classmethod

@@ -1,7 +1,7 @@
 """Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name.
 
-Then settings of joints at them without effect: axial forces on a rigid shaft, swings without orders; and a note where
-rigid shafts decide.
+Then settings of joints at them without effect: axial forces on a rigid shaft, swings without orders; and notes where
+rigid shafts decide, and where nothing holds pins along their holes.
 """
 
 from __future__ import annotations
@@ -365,3 +365,27 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
         "them: some loads are larger than with a spline."
     )
     return f"{note}\nWith a free output shaft: {command}" if command else note
+
+
+def note_on_pins(toleranced: Iterable[str], mechanism: Mechanism) -> str:
+    """Say that errors along pins have hardly any effect where nothing holds the pins.
+
+    Parameters
+    ----------
+    toleranced : iterable of str
+        Errors and zones that scatter.
+    mechanism : Mechanism
+        What is simulated.
+
+    Returns
+    -------
+    str
+        Empty with thrust faces, or where no error along a pin scatters.
+    """
+    along = any(column.endswith(".offset_e") for name in toleranced for column in columns_of(name))
+    if not along or mechanism.faces:
+        return ""
+    return (
+        "errors along the pins (offset_e) scatter, and have hardly any effect: without thrust faces pins slide freely "
+        "along their holes. Snap rings and cups that hold them: joint.thrust, see tolstat docs study."
+    )

@@ -1,9 +1,9 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``series.h5``, and, compared with
-``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of each, and
-``tilted_pin.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``series.h5``, ``snap_rings.h5``, and,
+compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of
+each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from tolstat.display.answer import Answer
 from tolstat.display.blocks import Panel, Panels
 from tolstat.joint import operating
 from tolstat.questions.shares import with_ends
+from tolstat.store import recorded
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -202,6 +203,27 @@ def series(folder: Path) -> None:
     save(figure, folder / "series.png")
 
 
+def snap_rings(folder: Path) -> None:
+    """Draw the share of joints above a load of the gearbox's bearing, by their end play, with 95 % intervals."""
+    with tolstat.open(folder / "snap_rings.h5") as store:
+        view, nominal = store.view(), recorded.joint_of(store, 0).thrust.end_play
+        load, play = view.load("input.bearing_a"), view.errors(np.arange(view.n))["thrust.end_play"]
+    play = 1e3 * (nominal + play)
+    ends = np.linspace(0.0, 0.04, 4)
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    for low, high, colour in zip(ends[:-1], ends[1:], ("#D55E00", "#009E73", "#0072B2"), strict=True):
+        x = np.sort(load.values[(play >= low) & (play < high) & np.isfinite(load.values)])
+        count = np.arange(x.size, 0, -1)
+        lower, upper = clopper_pearson(count, x.size)
+        ax.step(x, 100 * count / x.size, color=colour, where="pre", label=f"{low:.3f} to {high:.3f} mm")
+        ax.fill_between(x, 100 * lower, 100 * upper, color=colour, step="pre", alpha=0.2, lw=0)
+    ax.axvline(load.limit, color="#333333", ls="--", label="limit")
+    ax.set(xlabel="largest load of the gearbox's nearer bearing (N)", ylabel="joints above it (%)", ylim=(0, 104))
+    ax.grid(alpha=0.3)
+    figure.legend(loc="outside right upper", frameon=False, title="end play")
+    save(figure, folder / "snap_rings.png")
+
+
 def compared(folder: Path, name: str) -> None:
     """Draw the curves of a study and of iso2768_f, and their difference, for one force and one torque."""
     with tolstat.open(folder / "iso2768_f.h5") as a, tolstat.open(folder / f"{name}.h5") as b:
@@ -284,7 +306,18 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, lots, series)
+    drawn = (
+        welded_fork,
+        overnight,
+        fuzz,
+        hard_cases,
+        needle_bearings,
+        duty_cycle,
+        known_parts,
+        lots,
+        series,
+        snap_rings,
+    )
     for draw in (*drawn, rigid_shafts, line_bored):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)

@@ -111,7 +111,7 @@ def test_loss_is_that_of_pins_that_turn_to_and_fro() -> None:
 
 
 def test_preload_is_shared_by_faces_and_bushings() -> None:
-    """Negative end play of straight, slow shafts: face, cross and fork bushing of each pin in series; arms bend, too."""
+    """Negative end play of straight, slow shafts: face, cross and fork bushing of each pin in series; arms bend."""
     rows, mechanism = held(alpha=0.0, speed=RPM, shaft=FREE, thrust=FACES | {"end_play": "-0.02 mm"})
     result = simulate_rows(rows, OPTIONS, "none", 0, mechanism).results[0]
     cross, fork = (rows["k"][0, bushing_kind(kind)] for kind in ("cross", "input fork"))

@@ -15,7 +15,7 @@ from tolstat import sampling, study
 from tolstat.campaign import remedy, run
 from tolstat.common.cardan import CARDAN, SERIES
 from tolstat.common.errors import InputError
-from tolstat.joint import perturb
+from tolstat.joint import OperationInSeries, perturb
 from tolstat.solver import fidelity
 from tolstat.study import assumptions, changes, points, schema
 
@@ -63,7 +63,7 @@ def test_the_table_makes_a_study_of_two_joints() -> None:
     assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, joint 2 of 6 deg, its plane 180 deg ahead"
     drawn = perturb(read.joint, read.operation, sampling.draw(read))
     assert (drawn["pin_point"][1:] != 0.0).any(axis=2).all()
-    assert load(CASES).operations[0].mechanism == SERIES
+    assert isinstance(load(CASES).operations[0], OperationInSeries)
     assert points.Point.of("", read.points[0].values()) == read.points[0]
 
 

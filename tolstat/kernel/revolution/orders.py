@@ -35,7 +35,7 @@ def plus(total, value, c, s):
 
 @njit
 def bearing_sums(j, fx, fy, mx, my, par):
-    """Sums of the loads of both bearings of shaft ``par.borne[j]``, from those of its force and moment.
+    """Sums of the loads of both bearings of a shaft, number `j` of ``par.borne``, from those of its force and moment.
 
     `fx`, `fy`, `mx`, `my`: of their components, N and N m.
     """

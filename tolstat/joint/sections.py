@@ -196,7 +196,7 @@ class Unbalance(Strict):
     speed: Annotated[units.Speed, POSITIVE] | None = Field(default=None, examples=["3000 rpm"])
     """highest speed, which the grade is for"""
     angle: units.Angle | None = Field(default=None, examples=["30 deg"])
-    """direction, from x of the output shaft towards y; when left out: any, the same for none, uniformly distributed"""
+    """direction, from x of the output shaft towards y; the error `shaft.unbalance_angle` is a deviation from it"""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Unbalance:

@@ -117,7 +117,7 @@ def test_preload_is_shared_by_faces_and_bushings() -> None:
     cross, fork = (rows["k"][0, bushing_kind(kind)] for kind in ("cross", "input fork"))
     l_f = rows["marker"][0, bushing_kind("input fork"), 0, 2]
     compliance = 1 / 1e8 + 1 / cross[0] + 1 / fork[0] + l_f**2 / fork[4]
-    np.testing.assert_allclose(result["thrust_max"], 1e-5 / compliance, rtol=2e-3)
+    np.testing.assert_allclose(result["thrust_max"], 1e-5 / compliance, rtol=1e-2)  # arms that bend tilt holes, too
 
 
 def test_faces_hold_an_axial_force_across_the_input_shaft() -> None:

@@ -13,6 +13,7 @@ from tolstat.common.loads import loads_of, units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
+from tolstat.joint.model import GIVEN_BY
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
@@ -29,14 +30,6 @@ from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
 WHOLE = MECHANISMS[named(CARDAN, PARTS)]
 """The joint with all that it may have."""
-GIVEN_BY = dict(
-    zip(
-        PARTS,
-        ("[thrust]", "friction.mu", "shaft.input.bearings", "shaft.output.bearings", "shaft.unbalance"),
-        strict=True,
-    )
-)
-"""What of a joint file gives each of `PARTS`."""
 BAND = tuple(key for key in Banded.model_fields if key not in SingleEntry.model_fields)
 ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}

@@ -299,7 +299,7 @@ def test_a_retry_that_changes_the_shape_of_histories_is_refused(tmp_path: Path) 
 
 
 def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
-    study = SimpleNamespace(solver=Solver(), has_axial_force=False)
+    study = SimpleNamespace(solver=Solver(), no_closed_form=[])
     again = parse_retry("newton_failed, crashed", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
     assert again.status == (Status.NEWTON_FAILED, Status.CRASHED)
     assert again.settings == {"solver.steps_per_rev": 360, "solver.method": "tr_bdf2"}
@@ -314,7 +314,7 @@ def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
 
 
 def test_what_auto_chose_holds_for_joints_that_are_simulated_again() -> None:
-    study = SimpleNamespace(solver=Solver(fidelity="auto"), has_axial_force=False)
+    study = SimpleNamespace(solver=Solver(fidelity="auto"), no_closed_form=[])
     chosen = {"fidelity": "quasistatic", "steps_per_rev": 60}
     again = parse_retry("crashed", ["solver.newton_max_iter=40"], study).chosen(chosen).options
     assert (again.fidelity, again.steps_per_rev, again.newton_max_iter) == (Fidelity.QUASISTATIC, 60, 40)

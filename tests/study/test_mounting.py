@@ -14,6 +14,7 @@ from tolstat.common.cardan import MECHANISMS
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation
 from tolstat.joint import operating, perturb
+from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.study.points import note_on_pins, note_on_shafts
 
@@ -60,8 +61,8 @@ def test_an_axial_force_is_part_of_the_operating_point(tmp_path: Path) -> None:
     assert s.points[0].in_words == "15 deg, 500 rpm, 100 N m, axial force -200 N"
     assert load(tmp_path, NO_FORCE).points[0].in_words == "15 deg, 500 rpm, 100 N m"
     assert s.joint_in_words == "output shaft free along its axis; contact law mode"
-    assert s.has_axial_force
-    assert not load(tmp_path, NO_FORCE).has_axial_force
+    assert s.no_closed_form == [NO_CLOSED_FORM]
+    assert not load(tmp_path, NO_FORCE).no_closed_form
 
 
 def test_an_axial_force_scatters(tmp_path: Path) -> None:
@@ -75,7 +76,7 @@ def test_an_axial_force_scatters(tmp_path: Path) -> None:
     np.testing.assert_array_equal(errors["pin1.offset_t"], plain["pin1.offset_t"])
     np.testing.assert_array_equal(operating(s.operation, errors)["axial_force"], own - 200.0)
     np.testing.assert_array_equal(perturb(s.joint, s.operation, errors)["F_a"], own - 200.0)
-    assert load(tmp_path, NO_FORCE, ("[tolerances]\n", SCATTER)).has_axial_force
+    assert load(tmp_path, NO_FORCE, ("[tolerances]\n", SCATTER)).no_closed_form == [NO_CLOSED_FORM]
 
 
 def test_an_axial_force_on_rigid_shafts_is_refused(tmp_path: Path) -> None:
@@ -88,8 +89,8 @@ def test_an_axial_force_on_rigid_shafts_is_refused(tmp_path: Path) -> None:
     points = HEAD.replace("[operation]", '[[operation]]\nname = "a"')
     points += HEAD.partition("[operation]")[2].join(['[[operation]]\nname = "b"', ""]).replace("-200", "0")
     assert f"operation[0].axial_force: {NO_EFFECT}" in faults(tmp_path, RIGID, text=points + DRAWN)
-    assert load(tmp_path, text=points + DRAWN).at("a").has_axial_force
-    assert not load(tmp_path, text=points + DRAWN).at("b").has_axial_force
+    assert load(tmp_path, text=points + DRAWN).at("a").no_closed_form == [NO_CLOSED_FORM]
+    assert not load(tmp_path, text=points + DRAWN).at("b").no_closed_form
 
 
 def test_settings_without_effect_are_refused_with_the_other_faults(tmp_path: Path) -> None:
@@ -157,7 +158,7 @@ def test_words_are_varied(tmp_path: Path) -> None:
     assert [joint.shaft.axial for joint in s.joints] == ["rigid", 2e7]
     assert s.variants[0].values == {"shaft.axial": "rigid"}
     assert s.variants[1].values == {"shaft.axial": 2e7, "operation.axial_force": 70.0}
-    assert s.has_axial_force
+    assert s.no_closed_form == [NO_CLOSED_FORM]
     wrong = ('joint.shaft.axial = "2e7 N/m"', 'points = 2\nvary.shaft.axial = { from = "2e7 N/m", to = "free" }')
     assert "'free' is not a quantity that can vary" in faults(tmp_path, NO_FORCE, wrong, text=HEAD + CASES)
     one = ('joint.shaft.axial = "2e7 N/m"', 'joint.shaft.axial = "rigid"')

@@ -111,9 +111,9 @@ class Study:
         return (self.operation,)
 
     @property
-    def has_axial_force(self) -> bool:
-        """No axial force moves the output shaft."""
-        return False
+    def no_closed_form(self) -> list[tuple[str, str]]:
+        """Closed forms hold."""
+        return []
 
     def at(self, name: str) -> Study:
         """Return the study at one of its points."""

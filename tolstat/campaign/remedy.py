@@ -16,12 +16,10 @@ from tolstat.common import strict, tables
 from tolstat.common.errors import Fault, gather, input_error, raise_all
 from tolstat.common.fields import HistorySpec
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
-from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
 from tolstat.study import Study
-from tolstat.study.points import IDEAL_IN_SERIES, IDEAL_WITH_FRICTION
 from tolstat.study.rewriting import parsed
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
@@ -210,12 +208,8 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
-    if study.has_axial_force and solver.fidelity == "ideal":
-        faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
-    if solver.fidelity == "ideal" and study.mechanism.in_series:
-        faults.append(Fault("--set: solver.fidelity", *IDEAL_IN_SERIES))
-    if solver.fidelity == "ideal" and study.mechanism.friction:
-        faults.append(Fault("--set: solver.fidelity", *IDEAL_WITH_FRICTION))
+    if solver.fidelity == "ideal":
+        faults += [Fault("--set: solver.fidelity", *texts) for texts in study.no_closed_form]
     raise_all(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")

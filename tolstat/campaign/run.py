@@ -281,7 +281,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [MIN_SAMPLES] * ("cycles" in histories)
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
-        closed_form = not (study.has_axial_force or study.mechanism.in_series or study.mechanism.friction)
+        closed_form = not study.no_closed_form
         simulate = partial(simulate_beside, mechanism=study.mechanism)
         settings_of_choice = params, options, budget, study.asked, simulate, min_steps, closed_form
         return fidelity.choose(*settings_of_choice, mechanism=study.mechanism)

@@ -196,8 +196,8 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         Kind("drive", "drive", "driving torque", meaning=_DRIVE, places=driven, components=("m_z",), **of_moment),
         Kind("thrust", "F", "thrust force", "N", _THRUST, faces, measure=F),
         *(
-            Kind(f"bearing_{end}", f"bearing_{end}", "bearing load", "N", _BEARING, borne, measure=F, modulus=True)
-            for end in "ab"
+            Kind(key, key, noun, "N", _BEARING, borne, measure=F, modulus=True)
+            for key, noun in (("bearing_a", "load of bearing a"), ("bearing_b", "load of bearing b"))
         ),
     ]
     of_orders = (
@@ -205,8 +205,8 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         ("moment", "bending moment", "N*m", shafts, T),
         ("drive", "driving torque", "N*m", driven, T),
         ("psi", "speed error Psi", "1", JOINT, psi),
-        ("bearing_a", "bearing load", "N", borne, F),
-        ("bearing_b", "bearing load", "N", borne, F),
+        ("bearing_a", "load of bearing a", "N", borne, F),
+        ("bearing_b", "load of bearing b", "N", borne, F),
     )
     for symbol, noun, unit, where, measure in of_orders:
         meaning = (
@@ -216,7 +216,7 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         found.append(Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, of_revolution=True, measure=measure))
     for end in "ab":
         for rolling, exponent in EXPONENTS.items():
-            key, noun = f"bearing_{end}_{rolling}", f"equivalent load of {rolling}"
+            key, noun = f"bearing_{end}_{rolling}", f"equivalent load of bearing {end} with {rolling}"
             found.append(Kind(key, key, noun, "N", f"{_EQUIVALENT} {exponent}", borne, of_revolution=True, measure=F))
     found.append(
         Kind("loss", "loss", "loss", "W", _LOSS, (*pins, "") if mechanism.friction else (), of_revolution=True)

@@ -117,8 +117,8 @@ STATUS_TEXT = {
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), an axis tilted by more than 0.1 rad (5.7 deg), an "
-    "offset or a clearance above a tenth of R, |alpha| of 90 deg or more, no speed, or stiffness not positive: the "
-    "model has no meaning there; errors are in m and rad; results are NaN",
+    "offset or a clearance above a tenth of R, |alpha| of 90 deg or more, no speed, stiffness not positive, or "
+    "negative friction: the model has no meaning there; errors are in m and rad; results are NaN",
 }
 
 

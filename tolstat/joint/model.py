@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from operator import attrgetter
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from tolstat.common.cardan import PARTS
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
 from tolstat.common.errors import Fault
+from tolstat.common.loads import loads_of
 from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import tables
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
@@ -19,9 +23,28 @@ from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
 from tolstat.joint.sections import Arm, Bushing, Cross, Friction, Hub, Material, Pin, Shaft, Thrust
 
+GIVEN_BY = dict(
+    zip(
+        PARTS,
+        ("thrust", "friction.mu", "shaft.input", "shaft.output", "shaft.unbalance"),
+        strict=True,
+    )
+)
+"""Key of the joint that gives it each of `cardan.PARTS`."""
 TOLD = ("description", "assumed")
 """Keys of a joint file that are about the joint and no part of it."""
 NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
+
+
+def giving(pattern: str) -> str:
+    """Key of the joint that gives it an error or load of this name or pattern; empty where none of `GIVEN_BY` does."""
+
+    def names(parts: Collection[str]) -> set[str]:
+        every = [MECHANISMS[named(base, parts)] for base in (CARDAN, SERIES)]
+        return {name for one in every for name in (*loads_of(one), *(f.name for f in tables(one).error_fields))}
+
+    of_parts = ((key, names([part]) - names([])) for part, key in GIVEN_BY.items())
+    return next((key for key, own in of_parts if any(fnmatchcase(name, pattern) for name in own)), "")
 
 
 def affects_results(key: str, law: str | None = None) -> bool:
@@ -182,9 +205,8 @@ class Joint(Strict):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """What the joint has beside lumps, bushings and pairs, `cardan.PARTS`."""
-        of = (self.thrust, self.friction.mu, self.shaft.input, self.shaft.output, self.shaft.unbalance)
-        return tuple(part for part, given in zip(PARTS, of, strict=True) if given is not None)
+        """What the joint has beside lumps, bushings and pairs: those of `GIVEN_BY` whose key it has."""
+        return tuple(part for part, key in GIVEN_BY.items() if attrgetter(key)(self) is not None)
 
     @property
     def k_cross(self) -> Array:

@@ -210,7 +210,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     if joint.thrust is not None:
         half = 0.5 * joint.contact.z
         for i, face in enumerate(mechanism.faces):
-            play = joint.thrust.end_play + errors[f"{face.name.removesuffix(face.name[-1])}.end_play"]
+            play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if joint.shaft.unbalance is not None:
         size = joint.shaft.unbalance.size + errors["shaft.unbalance"]

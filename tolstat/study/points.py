@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field
 
 from tolstat.common import loads, units
+from tolstat.common.cardan import PARTS
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
@@ -28,15 +29,6 @@ from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
-IDEAL_WITH_FRICTION = (
-    "'ideal' does not hold with friction, which its closed forms leave out",
-    'write "quasistatic" or "dynamic"',
-)
-IDEAL_IN_SERIES = (
-    "'ideal' does not hold in series: its closed forms are those of one joint",
-    'write "quasistatic" or "dynamic"',
-)
-"""Fault of joints in series, and the remedy."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -270,6 +262,17 @@ class Setting(NamedTuple):
         return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
 
 
+def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
+    """Why closed forms do not hold for some joints, and the remedy, of each reason; `varied` as in `refusals`."""
+    every, remedy = list(settings), 'write "quasistatic" or "dynamic"'
+    if any(setting.moved(varied) for setting in every):
+        yield NO_CLOSED_FORM
+    if any(setting.joint.friction.mu is not None for setting in every):
+        yield "'ideal' does not hold with friction, which its closed forms leave out", remedy
+    if any(isinstance(setting.operation, OperationInSeries) for setting in every):
+        yield "'ideal' does not hold in series: its closed forms are those of one joint", remedy
+
+
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
@@ -298,12 +301,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
             for section in varied.get(f"operation.{key}_swing", ()):
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
-    if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
-        yield ("solver", "fidelity"), *NO_CLOSED_FORM
-    if any(setting.fidelity == "ideal" and setting.joint.friction.mu is not None for setting in settings):
-        yield ("solver", "fidelity"), *IDEAL_WITH_FRICTION
-    for part in {part for one in settings for part in one.joint.parts}:
-        if not all(part in setting.joint.parts for setting in settings):
+    for part in PARTS:
+        if len({part in setting.joint.parts for setting in settings}) > 1:
             found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
             yield ("joint",), found, "give it to all of them, or to none"
     of_shafts = [setting.joint.shaft.unbalance for setting in settings]
@@ -316,8 +315,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if any(setting.joint.shaft.slides for setting in in_series):
         found = "is not rigid: in series, tube and shafts are held on their axes, along and across"
         yield ("joint", "shaft", "axial"), found, 'write "rigid", or remove [series]'
-    if any(setting.fidelity == "ideal" for setting in in_series):
-        yield ("solver", "fidelity"), *IDEAL_IN_SERIES
+    for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
+        yield ("solver", "fidelity"), *texts
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:

@@ -17,10 +17,11 @@ from pydantic_core import PydanticCustomError
 from tolstat.common import strict
 from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
 from tolstat.common.errors import Fault, InputError, gather, input_error
-from tolstat.common.mechanism import Mechanism, features
+from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
 from tolstat.common.tables import tables
 from tolstat.common.units import to_si
+from tolstat.joint.model import giving
 from tolstat.joint.reading import is_joint
 from tolstat.study import signals
 from tolstat.study.axes import alike, columns_of, compatible, is_pair, is_zone, own, zone_of, zone_units
@@ -74,7 +75,7 @@ class Entry(NamedTuple):
 @cache
 def joints(mechanism: Mechanism) -> set[str]:
     """Names of the joints that stand before those of features; empty where there is one joint."""
-    return {feature.rpartition(".")[0] for feature in features(mechanism)} - {""}
+    return {prefix.rstrip(".") for prefix in prefixes(mechanism)} - {""}
 
 
 def entries(table: Mapping[str, Any], mechanism: Mechanism, *section: int | str) -> Iterator[Entry]:
@@ -170,6 +171,8 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
     if remedy := without_joint(pattern, names):
         return remedy
+    if key := giving(pattern):
+        return f"only joints with joint.{key} have it: add that, or remove this entry"
     every = list(dict.fromkeys(halves(name)[0] for name in names))
     feature, key = (pattern, "") if pattern in every else halves(pattern)
     known = [name for name in every if _matches(feature, name)]

@@ -147,9 +147,9 @@ class Study:
         return tuple(entry for entry in self.entries if entry.parts)
 
     @property
-    def has_axial_force(self) -> bool:
-        """Whether an axial force moves the output shaft of some joint."""
-        return any(setting.moved(self._varied) for setting in self._settings)
+    def no_closed_form(self) -> list[tuple[str, str]]:
+        """Why closed forms do not hold for some of the joints, see `points.no_closed_form`; empty where they do."""
+        return list(points.no_closed_form(self._settings, self._varied))
 
     @property
     def joint_in_words(self) -> str:

@@ -84,7 +84,7 @@ class Lives:
     @property
     def in_series(self) -> bool:
         """Whether the bearings are of several joints, which swing by different angles."""
-        return len(self.view.mechanism.cardan) > 1
+        return self.view.mechanism.in_series
 
     @property
     def valid(self) -> int:

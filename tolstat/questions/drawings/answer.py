@@ -14,8 +14,9 @@ from tolstat import joint as joints
 from tolstat import study
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
+from tolstat.common.mechanism import prefixes
 from tolstat.common.strict import read_toml, validate
-from tolstat.common.tables import SIMULATED, tables
+from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Row, Rows, Sentence
 from tolstat.questions.drawings import views
@@ -76,11 +77,11 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
 def _joints(view: View, marked: Collection[str], load: str) -> dict[str, tuple[Panel, Panel]]:
     """Front and side view of each Cardan joint at the operating point at which a load matters most, else at the first.
 
-    By what stands before the names of its parts, see `views.joints_in`.
+    By what stands before the names of its parts, see `mechanism.prefixes`.
     """
     point, joint = view.point_of(load) if load else view.points[0], recorded.joint_of(view.store, 0)
     alphas, drawn = view.at(point).store.operation.alphas, {}
-    for before, alpha in zip(views.joints_in(tables(view.mechanism).ERROR), alphas, strict=True):
+    for before, alpha in zip(prefixes(view.mechanism), alphas, strict=True):
         own = [name.removeprefix(before) for name in marked if name.startswith(before)]
         front, side = _named(views.views(joint, alpha, own), before)
         drawn[before] = front, replace(side, title=f"{side.title}, at {point}") if point else side

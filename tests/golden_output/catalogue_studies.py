@@ -118,3 +118,22 @@ SHAFT = Campaign(
         "page": ["report drive_shaft.h5 --out page.html --accept '30 %' --replay 20"],
     },
 )
+SERIES = Campaign(
+    "series",
+    ["run series.toml --n 24"],
+    {
+        "report": ["report series.h5 --wide --accept '30 %'"],
+        "worst": ["worst series.h5 --top 3"],
+        "bearing_life": ["bearing-life series.h5"],
+    },
+)
+RINGS = Campaign(
+    "snap_rings",
+    ["run snap_rings.toml --n 24"],
+    {
+        "report": ["report snap_rings.h5 --wide --accept '30 %'"],
+        "page": ["report snap_rings.h5 --out page.html --accept '30 %'"],
+        "orders": [f"{ROUGH}orders snap_rings.h5"],
+        "export": [f"{ROUGH}export snap_rings.h5 --csv - --nominal"],
+    },
+)

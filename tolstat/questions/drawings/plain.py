@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
-from os.path import commonprefix
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.common.mechanism import Mechanism
 from tolstat.display.answer import Axes, Panel
@@ -20,16 +18,13 @@ from tolstat.display.style import COLOURS, DASHES, INK
 from tolstat.kernel.mechanics.bushing import markers
 from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
 from tolstat.kernel.mechanics.triad import from_triad
-from tolstat.kernel.mechanics.work import make_work
-
-Array = NDArray[np.float64]
-Look = dict[str, Any]
+from tolstat.kernel.mechanics.work import work_dtype
+from tolstat.questions.drawings.views import MARKED, Array, Look
 
 VIEWS = {"side": (2, 0), "top": (2, 1), "front": (0, 1)}
 """Axes to the right and upwards of each view; 0, 1, 2 are x, y, z."""
 LEFT, BELOW, ABOVE = 0.62, 0.48, 0.26
 """Room beside and below a view for its scales, above it for its title, inches."""
-MARKED = "#C04A00"
 LINES: tuple[Look, ...] = tuple(
     {"color": colour, "ls": dash, "lw": width, "zorder": 3.0 - 0.1 * width}
     for colour, dash, width in zip((COLOURS[0], COLOURS[2], INK, COLOURS[3]), DASHES, (4.2, 3.2, 2.2, 1.6), strict=True)
@@ -37,8 +32,9 @@ LINES: tuple[Look, ...] = tuple(
 """Looks of members: where lines coincide, each is seen beside or between the others."""
 PIN: Look = {"marker": "o", "ms": 9.0, "mfc": "none", "mec": INK, "mew": 1.3, "zorder": 4, "label": "pin in its hole"}
 BUSHING: Look = {"marker": "s", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 0.9, "zorder": 3, "label": "bushing"}
-NAME: Look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": 8.0, "zorder": 5}
 ON_LINES: Look = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
+NAME: Look = {"textcoords": "offset points", "ha": "center", "va": "center", "size": 8.0, "zorder": 5, "bbox": ON_LINES}
+STRONG: Look = {"color": MARKED, "fontweight": "bold"}
 
 
 class Frame(NamedTuple):
@@ -72,7 +68,8 @@ class Part(NamedTuple):
     @property
     def place(self) -> Array:
         """Where its name stands, shape (3,), mm."""
-        return self.points[:2][-1]
+        place: Array = self.points[:2][-1]
+        return place
 
 
 def frames(mechanism: Mechanism, row: Any) -> list[Group]:
@@ -80,7 +77,7 @@ def frames(mechanism: Mechanism, row: Any) -> list[Group]:
 
     Members that no hinge connects are in different groups, each in axes of its own: the model has no distance between.
     """
-    work, groups = make_work(mechanism), list[Group]()
+    work, groups = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0], list[Group]()
     ideal_motion(0.0, row, work)
     for i, first in enumerate(mechanism.members):
         if any(first.name in group for group in groups):
@@ -118,7 +115,8 @@ def views(mechanism: Mechanism, row: Any, groups: Sequence[Group], marked: Colle
     size = np.max(spans, axis=0) + 0.5 * np.max(spans)
     scale = (WIDTH - 2.0 * LEFT - 0.2) / (size[2] + size[0])
     for group, parts in zip(groups, drawn, strict=True):
-        before = commonprefix(list(group)).rpartition(".")[0]
+        heads = {name.rpartition(".")[0] for name in group}
+        before = heads.pop() if len(heads) == 1 else ""
         title = f"{before or 'The mechanism'} in three views"
         words = ", ".join(f"{pair.pin} in {pair.hole}" for pair in mechanism.pairs if pair.pin in parts)
         there = ", ".join(sorted(parts.keys() & set(marked)))
@@ -132,8 +130,9 @@ def views(mechanism: Mechanism, row: Any, groups: Sequence[Group], marked: Colle
 
 def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
     """Pins, bushings and shafts of a group by name."""
-    bodies = (*mechanism.lumps, *mechanism.shafts)
-    member, at = {body.name: body.member for body in bodies}, {body.name: np.zeros(3) for body in bodies}
+    member = {lump.name: lump.member for lump in mechanism.lumps}
+    member |= {shaft.name: shaft.member for shaft in mechanism.shafts}
+    at = {body: np.zeros(3) for body in member}
     for i, lump in enumerate(mechanism.lumps):
         at[lump.name] += from_triad(i, tuple(row.at[row.lump_kind[i]]), row)
     drawn: list[tuple[str, str, list[Array], Look]] = []
@@ -177,11 +176,8 @@ def _draw(ax: Axes, parts: Mapping[str, Part], size: Array, scale: float, height
 
 def _view(view: Axes, parts: Mapping[str, Part], title: str, marked: Collection[str], before: str) -> None:
     """Draw the parts in one view, with the names of pins and of what is marked."""
-    axes, members, reach = (
-        list(VIEWS[title]),
-        list[str](),
-        (0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())),
-    )
+    axes, members = list(VIEWS[title]), list[str]()
+    reach = 0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())
     names: dict[tuple[float, ...], list[str]] = {}
     for name, part in parts.items():
         members += [part.member] * (part.member not in members)
@@ -189,21 +185,17 @@ def _view(view: Axes, parts: Mapping[str, Part], title: str, marked: Collection[
         if name in marked:
             line, sign = line | {"color": MARKED}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
         if len(part.points) > 1:
-            view.plot(
-                *part.points[:, axes].T, gid=f"{title}.{name}.line", label=part.member.removeprefix(before), **line
-            )
+            label = part.member.removeprefix(before)
+            view.plot(*part.points[:, axes].T, gid=f"{title}.{name}.line", label=label, **line)
         if sign:
             view.plot(*at, ls="", gid=f"{title}.{name}", **sign)
         if name in marked or part.look is PIN:
             near = (other for other in names if (abs(at - other) < reach).all())
             names.setdefault(next(near, tuple(at)), []).append(name)
-    for at, together in names.items():
-        away = 11.0 if at[1] > np.dot(view.get_ylim(), (0.55, 0.45)) else -11.0
-        for look, some in (
-            ({}, set(together) - set(marked)),
-            ({"color": MARKED, "fontweight": "bold"}, set(together) & set(marked)),
-        ):
+    for (x, y), together in names.items():
+        away = 11.0 if y > np.dot(view.get_ylim(), (0.55, 0.45)) else -11.0
+        for look, some in ((NAME, set(together) - set(marked)), (NAME | STRONG, set(together) & set(marked))):
             if some:
-                words = ", ".join(name.removeprefix(before) for name in sorted(some))
-                view.annotate(words, at, (0.0, away), **NAME, **look, bbox=ON_LINES)
+                words = ", ".join(sorted(name.removeprefix(before) for name in some))
+                view.annotate(words, (x, y), (0.0, away), **look)
                 away *= 2.0

@@ -29,10 +29,10 @@ LEGEND = (
 )
 """Text below the drawings of the joint."""
 PLAIN = (
-    "Lines go from pins and holes over their bushings to the hub or shaft that carries them; without errors, at the mean "
-    "input angle 0. The ends of shafts are sketched. Members that no hinge connects are drawn apart, in axes of their "
-    "own, since the model has no distance between them: z along the input shaft of a Cardan joint, x in the plane of its "
-    "shafts."
+    "Lines go from pins and holes over their bushings to the hub or shaft that carries them; without errors, at the "
+    "mean input angle 0. The ends of shafts are sketched. Members that no hinge connects are drawn apart, in axes of "
+    "their own, since the model has no distance between them: z along the input shaft of a Cardan joint, x in the "
+    "plane of its shafts."
 )
 """Text below the plain picture of a mechanism."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
@@ -131,8 +131,10 @@ def _plain_of(view: View, marked: Collection[str]) -> list[Part]:
         return []
     operation = view.at(point).store.operation
     params = joints.perturb(recorded.joint_of(view.store, 0), operation, joints.nominal_errors(1, mechanism))
-    panels = _plain(mechanism, params, marked)
-    return [Panels([replace(p, title=f"{p.title}, at {point}" if point else p.title) for p in panels]), Sentence(PLAIN)]
+    panels = [replace(p, title=p.title + f", at {point}" * bool(point)) for p in _plain(mechanism, params, marked)]
+    same = [[shaft.name for shaft in mechanism.shafts if shaft.turns == name] for name in mechanism.rotations]
+    bodies = "".join(f" {' and '.join(names)} are one body." for names in same if len(names) > 1)
+    return [Panels(panels), Sentence(PLAIN + bodies)]
 
 
 def _plain(mechanism: Mechanism, params: NDArray[np.void], marked: Collection[str]) -> list[Panel]:

@@ -23,7 +23,7 @@ from tolstat.questions.drawings.views import MARKED, Array, Look
 
 VIEWS = {"side": (2, 0), "top": (2, 1), "front": (0, 1)}
 """Axes to the right and upwards of each view; 0, 1, 2 are x, y, z."""
-LEFT, BELOW, ABOVE = 0.62, 0.48, 0.26
+LEFT, BELOW, ABOVE = 0.66, 0.48, 0.26
 """Room beside and below a view for its scales, above it for its title, inches."""
 LINES: tuple[Look, ...] = tuple(
     {"color": colour, "ls": dash, "lw": width, "zorder": 3.0 - 0.1 * width}
@@ -156,7 +156,7 @@ def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
     }
 
 
-def _draw(ax: Axes, parts: Mapping[str, Part], size: Array, scale: float, height: float, **names: Any) -> None:
+def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: float, **names: Any) -> None:
     """Draw the views, of a size in mm and a scale in inches a mm, and above them the legend; `names` as in `_view`."""
     ax.axis("off")
     ax.set_box_aspect(height / WIDTH)
@@ -174,28 +174,29 @@ def _draw(ax: Axes, parts: Mapping[str, Part], size: Array, scale: float, height
     ax.legend(entries.values(), entries, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
 
 
-def _view(view: Axes, parts: Mapping[str, Part], title: str, marked: Collection[str], before: str) -> None:
+def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str], before: str) -> None:
     """Draw the parts in one view, with the names of pins and of what is marked."""
-    axes, members = list(VIEWS[title]), list[str]()
+    axes, members, names = list(VIEWS[title]), list[str](), dict[tuple[float, ...], list[str]]()
     reach = 0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())
-    names: dict[tuple[float, ...], list[str]] = {}
     for name, part in parts.items():
         members += [part.member] * (part.member not in members)
-        line, sign, at = LINES[members.index(part.member) % 4], part.look, part.place[axes]
+        line, sign = LINES[members.index(part.member) % 4] | {"label": part.member.removeprefix(before)}, part.look
         if name in marked:
-            line, sign = line | {"color": MARKED}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
+            line, sign = line | {"color": MARKED, "label": ""}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
         if len(part.points) > 1:
-            label = part.member.removeprefix(before)
-            view.plot(*part.points[:, axes].T, gid=f"{title}.{name}.line", label=label, **line)
+            view.plot(*part.points[:, axes].T, gid=f"{title}.{name}.line", **line)
         if sign:
-            view.plot(*at, ls="", gid=f"{title}.{name}", **sign)
-        if name in marked or part.look is PIN:
+            view.plot(*part.place[axes], ls="", gid=f"{title}.{name}", **sign)
+    for name in reversed(parts):
+        if name in marked or parts[name].look is PIN:
+            at = parts[name].place[axes]
             near = (other for other in names if (abs(at - other) < reach).all())
             names.setdefault(next(near, tuple(at)), []).append(name)
     for (x, y), together in names.items():
-        away = 11.0 if y > np.dot(view.get_ylim(), (0.55, 0.45)) else -11.0
+        up, heights = y > np.dot(view.get_ylim(), (0.55, 0.45)), [parts[name].place[axes[1]] for name in together]
+        outside, away = (x, max(heights) if up else min(heights)), 11.0 if up else -11.0
         for look, some in ((NAME, set(together) - set(marked)), (NAME | STRONG, set(together) & set(marked))):
             if some:
                 words = ", ".join(sorted(name.removeprefix(before) for name in some))
-                view.annotate(words, (x, y), (0.0, away), **look)
+                view.annotate(words, outside, (0.0, away), **look)
                 away *= 2.0

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tolstat.joint import perturb as perturb
     from tolstat.questions.drawings.answer import draw_errors as draw_errors
     from tolstat.questions.drawings.answer import draw_joint as draw_joint
+    from tolstat.questions.drawings.answer import draw_mechanism as draw_mechanism
     from tolstat.questions.drawings.answer import draw_row as draw_row
     from tolstat.report.answer import statistics as statistics
     from tolstat.report.answer import write_report as write_report
@@ -51,6 +52,7 @@ _HOMES = {
     "draw": "tolstat.sampling:draw",
     "draw_errors": "tolstat.questions.drawings.answer:draw_errors",
     "draw_joint": "tolstat.questions.drawings.answer:draw_joint",
+    "draw_mechanism": "tolstat.questions.drawings.answer:draw_mechanism",
     "draw_row": "tolstat.questions.drawings.answer:draw_row",
     "function": "tolstat.campaign.function:function",
     "load": "tolstat.study:load",

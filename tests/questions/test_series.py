@@ -16,6 +16,7 @@ from tolstat.common.tables import Status, tables, without_results
 from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.bearing_life.lives import lives_of
+from tolstat.questions.drawings import answer as drawings
 from tolstat.questions.exceedance import curves
 from tolstat.solver import stationary
 from tolstat.store.view import View
@@ -95,3 +96,17 @@ def test_a_change_may_set_joint_2(of_study):
 def test_the_mounting_of_shafts_is_not_assumed(of_study):
     assert "mounting" in {each.name for each in assumptions(study.load(ROOT / "studies" / "rigid_shafts.toml"))}
     assert "mounting" not in {each.name for each in assumptions(of_study)}
+
+
+def test_the_page_has_a_plain_picture_of_each_joint_beside_its_own_drawing(view):
+    pair = view()
+    plain, words, drawn, *_ = drawings.drawings(pair).parts
+    assert [panel.key for panel in plain.panels] == ["plain-joint1", "plain-joint2"]
+    marked = {name.partition(".")[0]: name.rpartition(".")[0] for name in pair.leading}
+    for panel in plain.panels:
+        name = panel.key.removeprefix("plain-")
+        assert panel.title == f"{name} in three views"
+        assert (f"Marked: {marked[name]}." in panel.description) == (name in marked)
+    assert marked
+    assert words.text.endswith("joint1.output and joint2.input are one body.")
+    assert [panel.key for panel in drawn.panels[:2]] == ["joint-front-joint1", "joint-side-joint1"]

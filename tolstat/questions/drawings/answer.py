@@ -14,7 +14,7 @@ from tolstat import joint as joints
 from tolstat import study
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
-from tolstat.common.mechanism import prefixes
+from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
@@ -28,6 +28,13 @@ LEGEND = (
     "act on the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
 )
 """Text below the drawings of the joint."""
+PLAIN = (
+    "Lines go from pins and holes over their bushings to the hub or shaft that carries them; without errors, at the "
+    "mean input angle 0. The ends of shafts are sketched. Members that no hinge connects are drawn apart, in axes of "
+    "their own, since the model has no distance between them: z along the input shaft of a Cardan joint, x in the "
+    "plane of its shafts."
+)
+"""Text below the plain picture of a mechanism."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
 """Text below the drawings of the worst joints."""
 NOTES = (
@@ -105,16 +112,36 @@ def drawings(view: View) -> Answer:
     Returns
     -------
     Answer
-        Pictures: the joint from all sides, with the places of the leading loads marked; the kinds of its errors; errors
-        of the joints with the largest leading loads, enlarged.
+        Pictures: the joint from all sides, with the places of the leading loads marked, before it a plain picture of
+        joints in series; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
     kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
     drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
-    parts: list[Part] = [Panels([*drawn, kinds]), Sentence(LEGEND)]
+    parts: list[Part] = [*_plain_of(view, marked), Panels([*drawn, kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
     return Answer("drawings", "The joint and its errors, drawn", parts)
+
+
+def _plain_of(view: View, marked: Collection[str]) -> list[Part]:
+    """Plain picture of what is not one Cardan joint, which draws itself, at the first operating point."""
+    mechanism, point = view.mechanism, view.points[0]
+    if len(mechanism.cardan) == 1:
+        return []
+    operation = view.at(point).store.operation
+    params = joints.perturb(recorded.joint_of(view.store, 0), operation, joints.nominal_errors(1, mechanism))
+    panels = [replace(p, title=p.title + f", at {point}" * bool(point)) for p in _plain(mechanism, params, marked)]
+    same = [[shaft.name for shaft in mechanism.shafts if shaft.turns == name] for name in mechanism.rotations]
+    bodies = "".join(f" {' and '.join(names)} are one body." for names in same if len(names) > 1)
+    return [Panels(panels), Sentence(PLAIN + bodies)]
+
+
+def _plain(mechanism: Mechanism, params: NDArray[np.void], marked: Collection[str]) -> list[Panel]:
+    from tolstat.questions.drawings import plain
+
+    row = params.view(np.recarray)[0]
+    return plain.views(mechanism, row, plain.frames(mechanism, row), marked)
 
 
 def _worst(view: View) -> list[Panel]:
@@ -230,6 +257,25 @@ def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str =
     each = [_named(views.views(joint, own), name) for own, name in zip(alphas, names, strict=True)]
     panels = list(chain.from_iterable(each))
     return drawing.sheet(panels, title or joint.description or "Cardan joint", NOTES, columns)
+
+
+def draw_mechanism(
+    mechanism: Mechanism, params: NDArray[np.void], title: str = "", marked: Collection[str] = ()
+) -> Figure:
+    """Draw any mechanism from its geometry: three views with members as lines and pins in their holes as circles.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    params : ndarray, shape (1,), dtype PARAM
+        Its parameters.
+    title : str
+        Headline; the mechanism's name by default.
+    marked : collection of str
+        Bushings, pins and shafts that stand out.
+    """
+    return drawing.sheet(_plain(mechanism, params, marked), title or mechanism.name, [PLAIN])
 
 
 def draw_errors(joint: joints.Joint) -> Figure:

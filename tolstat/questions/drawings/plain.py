@@ -1,0 +1,202 @@
+"""Plain picture of any mechanism from its geometry: members as lines, pins in their holes as circles, three views.
+
+Everything is drawn at the mean input angle 0, without errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolstat.common.mechanism import Mechanism
+from tolstat.display.answer import Axes, Panel
+from tolstat.display.drawing import WIDTH
+from tolstat.display.style import COLOURS, DASHES, INK
+from tolstat.kernel.mechanics.bushing import markers
+from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
+from tolstat.kernel.mechanics.triad import from_triad
+from tolstat.kernel.mechanics.work import work_dtype
+from tolstat.questions.drawings.views import MARKED, Array, Look
+
+VIEWS = {"side": (2, 0), "top": (2, 1), "front": (0, 1)}
+"""Axes to the right and upwards of each view; 0, 1, 2 are x, y, z."""
+LEFT, BELOW, ABOVE = 0.66, 0.48, 0.26
+"""Room beside and below a view for its scales, above it for its title, inches."""
+LINES: tuple[Look, ...] = tuple(
+    {"color": colour, "ls": dash, "lw": width, "zorder": 3.0 - 0.1 * width}
+    for colour, dash, width in zip((COLOURS[0], COLOURS[2], INK, COLOURS[3]), DASHES, (4.2, 3.2, 2.2, 1.6), strict=True)
+)
+"""Looks of members: where lines coincide, each is seen beside or between the others."""
+PIN: Look = {"marker": "o", "ms": 9.0, "mfc": "none", "mec": INK, "mew": 1.3, "zorder": 4, "label": "pin in its hole"}
+BUSHING: Look = {"marker": "s", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 0.9, "zorder": 3, "label": "bushing"}
+ON_LINES: Look = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
+NAME: Look = {"textcoords": "offset points", "ha": "center", "va": "center", "size": 8.0, "zorder": 5, "bbox": ON_LINES}
+STRONG: Look = {"color": MARKED, "fontweight": "bold"}
+
+
+class Frame(NamedTuple):
+    """Frame of a member: origin, shape (3,), m, and attitude, shape (3, 3)."""
+
+    origin: Array
+    attitude: Array
+
+
+Group = Mapping[str, Frame]
+"""Frames of members that hinges connect, by name, in common axes."""
+
+
+class Part(NamedTuple):
+    """Pin, bushing or shaft as it is drawn.
+
+    Attributes
+    ----------
+    member : str
+        Its member.
+    points : ndarray, shape (n, 3)
+        Middle of the pin; lump, marker and base of the bushing; both ends of the shaft, the outer one last; mm.
+    look : dict
+        Of the sign at its place.
+    """
+
+    member: str
+    points: Array
+    look: Look
+
+    @property
+    def place(self) -> Array:
+        """Where its name stands, shape (3,), mm."""
+        place: Array = self.points[:2][-1]
+        return place
+
+
+def frames(mechanism: Mechanism, row: Any) -> list[Group]:
+    """Frames of the members by their ideal motion, at the mean input angle 0; `row`: record of PARAM.
+
+    Members that no hinge connects are in different groups, each in axes of its own: the model has no distance between.
+    """
+    work, groups = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0], list[Group]()
+    ideal_motion(0.0, row, work)
+    for i, first in enumerate(mechanism.members):
+        if any(first.name in group for group in groups):
+            continue
+        c, s = work.turned[i]
+        found = {first.name: np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])}
+        for _ in mechanism.hinges:  # each pass reaches another member, until all are reached
+            for k, (_, pin, hole, _) in enumerate(mechanism.hinges):
+                relative = np.transpose([to_hole(k, tuple(axis), row, work) for axis in np.eye(3)])
+                if hole in found:
+                    found.setdefault(pin, found[hole] @ relative)
+                elif pin in found:
+                    found[hole] = found[pin] @ relative.T
+        # the axis of a hinge goes through the origins of both members
+        groups.append({name: Frame(np.zeros(3), attitude) for name, attitude in found.items()})
+    return groups
+
+
+def views(mechanism: Mechanism, row: Any, groups: Sequence[Group], marked: Collection[str] = ()) -> list[Panel]:
+    """Three views of each group of members, all to one scale; bushings, pins and shafts in `marked` stand out.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    row : record of PARAM
+        Its parameters.
+    groups : sequence of mapping
+        Frames of its members, see `frames`.
+    marked : collection of str
+        Names such as ``"joint1.cross1"``, ``"pin3"``, ``"output"``.
+    """
+    panels, drawn = [], [_parts(mechanism, row, group) for group in groups]
+    spans = [np.ptp(np.concatenate([part.points for part in parts.values()]), axis=0) for parts in drawn]
+    size = np.max(spans, axis=0) + 0.5 * np.max(spans)
+    scale = (WIDTH - 2.0 * LEFT - 0.2) / (size[2] + size[0])
+    for group, parts in zip(groups, drawn, strict=True):
+        heads = {name.rpartition(".")[0] for name in group}
+        before = heads.pop() if len(heads) == 1 else ""
+        title = f"{before or 'The mechanism'} in three views"
+        words = ", ".join(f"{pair.pin} in {pair.hole}" for pair in mechanism.pairs if pair.pin in parts)
+        there = ", ".join(sorted(parts.keys() & set(marked)))
+        words = f"{title} at the mean input angle 0: {words}.{f' Marked: {there}.' if there else ''}"
+        legend = 0.24 * -(-(len(group) + 2) // 3)
+        height = scale * (size[0] + size[1]) + 2.0 * (BELOW + ABOVE) + legend
+        draw = partial(_draw, parts=parts, size=size, scale=scale, height=height, marked=marked, before=f"{before}.")
+        panels.append(Panel(f"plain-{before or 'all'}", title, words, draw, (WIDTH, height), bare=True))
+    return panels
+
+
+def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
+    """Pins, bushings and shafts of a group by name."""
+    member = {lump.name: lump.member for lump in mechanism.lumps}
+    member |= {shaft.name: shaft.member for shaft in mechanism.shafts}
+    at = {body: np.zeros(3) for body in member}
+    for i, lump in enumerate(mechanism.lumps):
+        at[lump.name] += from_triad(i, tuple(row.at[row.lump_kind[i]]), row)
+    drawn: list[tuple[str, str, list[Array], Look]] = []
+    feet = {shaft.name: list[float]() for shaft in mechanism.shafts}
+    for i, bushing in enumerate(mechanism.bushings):
+        marker = at[bushing.base] + markers(i, row)[1]
+        end = at[bushing.base]
+        if bushing.base in feet:
+            end = marker * (0.0, 0.0, 1.0)
+            feet[bushing.base].append(marker[2])
+        drawn.append((bushing.name, bushing.lump, [at[bushing.lump], marker, end], BUSHING))
+    for name, z in feet.items():
+        low, high = min(z, default=0.0), max(z, default=0.0)
+        ends = sorted((low - row.R * (low <= 0.0), high + row.R * (high >= 0.0)), key=abs)
+        drawn.append((name, name, [np.array([0.0, 0.0, end]) for end in ends], {}))
+    drawn += [(pair.pin, pair.pin, [at[pair.pin]], PIN) for pair in mechanism.pairs]
+    return {
+        name: Part(member[body], 1e3 * (group[member[body]].origin + points @ group[member[body]].attitude.T), look)
+        for name, body, points, look in drawn
+        if member[body] in group
+    }
+
+
+def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: float, **names: Any) -> None:
+    """Draw the views, of a size in mm and a scale in inches a mm, and above them the legend; `names` as in `_view`."""
+    ax.axis("off")
+    ax.set_box_aspect(height / WIDTH)
+    points = np.concatenate([part.points for part in parts.values()])
+    ends = 0.5 * (points.min(axis=0) + points.max(axis=0)) + np.multiply.outer((-0.5, 0.5), size)
+    right_of, over = 2.0 * LEFT + scale * size[2], 2.0 * BELOW + ABOVE + scale * size[1]
+    corners = ((LEFT, over), (LEFT, BELOW), (right_of, BELOW))
+    for (title, (right, up)), (x, y) in zip(VIEWS.items(), corners, strict=True):
+        box = (x / WIDTH, y / height, scale * size[right] / WIDTH, scale * size[up] / height)
+        view = ax.inset_axes(box, xlim=ends[:, right], ylim=ends[:, up])
+        view.set(xlabel=f"{'xyz'[right]} [mm]", ylabel=f"{'xyz'[up]} [mm]")
+        view.set_title(title, fontsize=8.8)
+        _view(view, parts, title, **names)
+    entries = {label: handle for handle, label in zip(*view.get_legend_handles_labels(), strict=True)}
+    ax.legend(entries.values(), entries, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+
+
+def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str], before: str) -> None:
+    """Draw the parts in one view, with the names of pins and of what is marked."""
+    axes, members, names = list(VIEWS[title]), list[str](), dict[tuple[float, ...], list[str]]()
+    reach = 0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())
+    for name, part in parts.items():
+        members += [part.member] * (part.member not in members)
+        line, sign = LINES[members.index(part.member) % 4] | {"label": part.member.removeprefix(before)}, part.look
+        if name in marked:
+            line, sign = line | {"color": MARKED, "label": ""}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
+        if len(part.points) > 1:
+            view.plot(*part.points[:, axes].T, gid=f"{title}.{name}.line", **line)
+        if sign:
+            view.plot(*part.place[axes], ls="", gid=f"{title}.{name}", **sign)
+    for name in reversed(parts):
+        if name in marked or parts[name].look is PIN:
+            at = parts[name].place[axes]
+            near = (other for other in names if (abs(at - other) < reach).all())
+            names.setdefault(next(near, tuple(at)), []).append(name)
+    for (x, y), together in names.items():
+        up, heights = y > np.dot(view.get_ylim(), (0.55, 0.45)), [parts[name].place[axes[1]] for name in together]
+        outside, away = (x, max(heights) if up else min(heights)), 11.0 if up else -11.0
+        for look, some in ((NAME, set(together) - set(marked)), (NAME | STRONG, set(together) & set(marked))):
+            if some:
+                words = ", ".join(sorted(name.removeprefix(before) for name in some))
+                view.annotate(words, outside, (0.0, away), **look)
+                away *= 2.0

@@ -18,7 +18,7 @@ ANGLES, INERTIA, SLOW = (0.26, 0.2), 0.01, 50 * np.pi / 30
 
 
 def partner(position: str, alpha: float) -> orders.Partner:
-    """The other joint, its forks in phase and the outer shafts to the same side of the tube by half a turn."""
+    """The other joint, its forks in phase: at equal misalignments the output turns evenly."""
     return orders.Partner.model_construct(position=position, alpha=alpha, inertia=INERTIA, offset=0.0)
 
 
@@ -32,7 +32,7 @@ def both(params: Any, random_errors: Any) -> Any:
     ]
     for first, second in pairs:
         second["Js"] = INERTIA
-        series.append(joined(first[0], second[0], 1.5 * np.pi, INERTIA))
+        series.append(joined(first[0], second[0], 0.5 * np.pi, INERTIA))
     for k, (position, alpha) in enumerate((("after", ANGLES[1]), ("before", ANGLES[0]))):
         rows = np.concatenate([pair[k] for pair in pairs])
         rows["Js"] = INERTIA

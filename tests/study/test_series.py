@@ -60,7 +60,7 @@ def test_the_table_makes_a_study_of_two_joints() -> None:
     read = load(WHOLE)
     assert read.mechanism == SERIES
     assert read.operation.alphas == pytest.approx(np.radians([8, 6]))
-    assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, joint 2 of 6 deg, its plane 180 deg ahead"
+    assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, joint 2 of 6 deg"
     drawn = perturb(read.joint, read.operation, sampling.draw(read))
     assert (drawn["pin_point"][1:] != 0.0).any(axis=2).all()
     assert isinstance(load(CASES).operations[0], OperationInSeries)

@@ -91,21 +91,17 @@ class Series(Strict):
 
     alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
     """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
-    angle: units.Angle = Field(default=np.pi, json_schema_extra={"default": "180 deg"}, examples=["0 deg"])
-    """angle of the plane of joint 2 ahead of that of joint 1, about the tube; at 180 deg, the default, the outer shafts
-    of joints of equal misalignment are parallel, at 0 deg both joints bend the same way"""
     offset: units.Angle = Field(default=0.0, examples=["5 deg"])
     """angle by which the fork at the tube's output end is turned ahead of where, at equal misalignments, the output
-    turns evenly"""
+    turns evenly: ahead of the fork at its input end, less the angle between the planes of the two joints"""
     inertia: units.Inertia = Field(examples=["0.01 kg*m^2"])
     """moment of inertia of the tube about its axis"""
 
     @property
     def in_words(self) -> str:
-        """``"joint 2 of 6 deg, its plane 180 deg ahead"``."""
+        """``"joint 2 of 6 deg, offset 5 deg"``."""
         turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
-        alpha, angle = (f"{math.degrees(value):.4g} deg" for value in (self.alpha, self.angle))
-        return f"joint 2 of {alpha}, its plane {angle} ahead{turned}"
+        return f"joint 2 of {math.degrees(self.alpha):.4g} deg{turned}"
 
 
 class OperationInSeries(Operation):
@@ -185,7 +181,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     if isinstance(operation, OperationInSeries):
         series = operation.series
         params["alpha"][:, 1] = series.alpha
-        params["ahead"][:, 1] = 0.5 * np.pi + series.angle + series.offset
+        params["ahead"][:, 1] = 0.5 * np.pi + series.offset
         params["Js"][:, 0] = series.inertia
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]

@@ -16,7 +16,8 @@ from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.mechanics.work import FORCE, make_work
 
 OPTIONS = Options()
-SERIES = joints.Series.model_construct(alpha=0.2, angle=0.5, offset=0.1, inertia=0.004)
+SERIES = joints.Series.model_construct(alpha=0.2, offset=0.1, inertia=0.004)
+ACROSS = {"lateral": "2e7 N/m", "mass": "5 kg", "unbalance": {"amount": "1e-3 kg*m", "angle": "30 deg"}}
 MECHANISMS = pytest.mark.parametrize("series", [None, SERIES], ids=["joint", "series"])
 
 
@@ -40,6 +41,23 @@ def state(seed: int, series: joints.Series | None = None, turned: float = 5e-3, 
 def sections_of(series: joints.Series | None) -> dict:
     shaft = {} if series else {"shaft": FREE}  # joints in series have theirs held
     return {"thrust": FACES | {"end_play": "0 mm"}, "friction": FRICTION, **shaft}
+
+
+def test_a_shaft_that_moves_across_has_the_accelerations_and_loads_of_the_twin() -> None:
+    par, mechanism, t, q, v = state(1, thrust=FACES | {"end_play": "0 mm"}, shaft=FREE | ACROSS)
+    work, a = make_work(mechanism), np.full(mechanism.dof, np.nan)
+    dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
+    largest = np.abs(work.force).max()
+    for name, difference in naive.imbalance(t, q, v, a, par, mechanism).items():
+        assert np.abs(difference).max() < 1e-8 * largest, name
+    out = np.full(mechanism.dof, np.nan)
+    dynamics.residual(t, q, v, a, par, OPTIONS, work, out)
+    assert np.abs(out).max() < 1e-11 * largest
+    write_loads(v, par, work)
+    complete_loads(par, work)
+    carried = par.k_l * q[-2:] + par.c_l * (v[-2:] + work.frame_w[par.frame[-1], 2] * np.array([-q[-1], q[-2]]))
+    lateral = work.loads[spans(mechanism)["lateral"]][1]
+    assert lateral == pytest.approx(np.linalg.norm(carried), rel=1e-12)
 
 
 @MECHANISMS

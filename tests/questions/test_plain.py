@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 import tolstat
 from tests.kernel.test_bearing_line import LINE
 from tests.kernel.test_bearing_line import parameters as of_line
-from tests.support import naive
+from tests.support import linkages, naive
 from tests.support.environment import ROOT
 from tests.support.mechanisms import triads
 from tolstat import study
@@ -217,3 +217,15 @@ def test_a_figure_of_the_package() -> None:
     figure = tolstat.draw_mechanism(LINE, of_line(0.0))
     assert figure.texts[0].get_text() == "shaft in three bearings"
     assert len(figure.axes[0].child_axes) == 3
+
+
+def test_members_of_a_linkage_lie_where_the_twin_has_them() -> None:
+    mechanism = linkages.mechanism_of("bennett")
+    row = linkages.parameters("bennett", mechanism)[0]
+    attitudes, origins = naive.placed(0.0, row, mechanism)
+    [group] = plain.frames(mechanism, row)
+    for i, member in enumerate(mechanism.members):
+        np.testing.assert_allclose(group[member.name].attitude, attitudes[i], atol=1e-12)
+        np.testing.assert_allclose(group[member.name].origin, origins[i], atol=1e-12)
+    pictured = plain.views(mechanism, row, [group])
+    assert len(pictured) == 3

@@ -132,3 +132,14 @@ def test_faces_hold_an_axial_force_across_the_input_shaft() -> None:
         least[name] = lateral.min()
     assert least["free"] < 0.1
     assert least["held"] > 0.75
+
+
+def test_a_shaft_that_only_the_joint_carries_hands_an_axial_force_on() -> None:
+    """Faces with preload hold it across: nothing else does, and the input shaft has F sin(alpha) throughout."""
+    force, shaft = 2000.0, FREE | {"lateral": "free", "mass": "5 kg"}
+    rows, mechanism = held(axial_force=force, shaft=shaft, thrust=FACES | {"end_play": "-0.02 mm"})
+    found = simulate_rows(rows, OPTIONS, "full", 0, mechanism)
+    assert found.results["status"] == Status.OK
+    on_input, on_output = np.linalg.norm(found.histories["shafts"][0, :, :, :2], axis=-1).T
+    np.testing.assert_allclose(on_input, force * np.sin(np.radians(15.0)), rtol=0.02)
+    assert (on_output == 0).all()

@@ -48,6 +48,11 @@ REFUSED = {
         "joint.friction.mu",
     ),
     "faces without stiffness": ({"parts": 'thrust.end_play = "0.02 mm"'}, "thrust.k: missing key", "add thrust.k"),
+    "shaft that nothing holds across": (
+        {"parts": 'shaft.lateral = "free"'},
+        "thrust: missing, and shaft.lateral is not rigid",
+        "[joint.thrust]",
+    ),
     "negative friction": ({"parts": "friction.mu = -0.1"}, "joint.friction.mu: -0.1 must not be negative", "zero"),
     "bearings in the wrong order": (
         {"parts": 'shaft.input.bearings = ["240 mm", "80 mm"]'},

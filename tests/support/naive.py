@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.mechanisms import triads
 from tolstat.common.cardan import CARDAN
-from tolstat.common.mechanism import DRIVEN, HELD
+from tolstat.common.mechanism import DRIVEN, HELD, SERIES
 
 Z = np.array([0.0, 0.0, 1.0])
 NODES = np.arange(-4, 5)
@@ -41,6 +41,8 @@ def joint_frames(theta, alpha):
 
 def frames(theta, par, mechanism=CARDAN):
     """Attitudes of the members, (n, 3, 3), where the input is at `theta`."""
+    if mechanism.placed:
+        return placed(theta, par, mechanism)[0]
     found = [turn(Z, {HELD: 0.0, DRIVEN: theta}.get(member.motion, np.nan)) for member in mechanism.members]
     names = [member.name for member in mechanism.members]
     for name, alpha, ahead in zip(mechanism.cardan, par.alpha, par.ahead, strict=True):
@@ -49,6 +51,19 @@ def frames(theta, par, mechanism=CARDAN):
         output = turn((0, -1, 0), alpha) @ found[first + 2]
         theta = np.arctan2(output[1, 0], output[0, 0])
     return np.array(found)
+
+
+def placed(theta, par, mechanism):
+    """Attitudes, (n, 3, 3), and origins, (n, 3), of members that have a place in their parents."""
+    poses = {"": (np.eye(3), np.zeros(3))}
+    for i, member in enumerate(mechanism.members):
+        attitude, origin = poses[member.parent]
+        order = np.arange(1, mechanism.waves + 1)
+        series = par.wave[i, :, 0] @ np.cos(order * theta) + par.wave[i, :, 1] @ np.sin(order * theta)
+        of_series = par.angle[i, 0] + par.angle[i, 1] * theta + series
+        angle = {HELD: 0.0, DRIVEN: theta, SERIES: of_series}[member.motion]
+        poses[member.name] = attitude @ par.mount[i] @ turn(Z, angle), origin + attitude @ par.pivot[i]
+    return tuple(np.array([poses[member.name][k] for member in mechanism.members]) for k in range(2))
 
 
 def input_angle(phase, par):
@@ -63,23 +78,45 @@ def resisting_torque(phase, par):
     return par.torque + sum(cosine * np.cos(x) + sine * np.sin(x) for x, (cosine, sine) in waves)
 
 
+def members_of_bodies(mechanism):
+    """Number of the member of each body, lumps before shafts."""
+    names = [member.name for member in mechanism.members]
+    return [names.index(part.member) for part in (*mechanism.lumps, *mechanism.shafts)]
+
+
 def ideal_attitudes(t, par, mechanism):
     """Attitudes of the ideal frames of all bodies at one time, lumps before shafts, (bodies, 3, 3)."""
-    names = [member.name for member in mechanism.members]
-    of = [names.index(part.member) for part in (*mechanism.lumps, *mechanism.shafts)]
-    return frames(input_angle(par.omega * t, par), par, mechanism)[of]
+    return frames(input_angle(par.omega * t, par), par, mechanism)[members_of_bodies(mechanism)]
+
+
+def origins(t, par, mechanism):
+    """Origins of the ideal frames of all bodies at one time, (bodies, 3)."""
+    of = members_of_bodies(mechanism)
+    if not mechanism.placed:
+        return np.zeros((len(of), 3))
+    return placed(input_angle(par.omega * t, par), par, mechanism)[1][of]
+
+
+def triads_of(par, mechanism):
+    """Rows e, t, z of each lump in axes of its member, (lumps, 3, 3)."""
+    return par.triad if len(par.triad) else triads(mechanism)
 
 
 def places(par, mechanism):
     """Reference points of the lumps in axes of their members, (lumps, 3)."""
     kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
-    return np.einsum("ba,bak->bk", par.at[kinds], triads(mechanism))
+    return np.einsum("ba,bak->bk", par.at[kinds], triads_of(par, mechanism))
 
 
 def of_shafts(values, par, mechanism):
-    """Rotation about z and displacement along it of each shaft by the unknowns `values` of shafts, (shafts, 2)."""
+    """Rotation about z and displacement of each shaft by the unknowns `values` of shafts, (shafts, 4)."""
     value = dict(zip(mechanism.unknowns, values, strict=True)) | {"": 0.0}
-    return np.array([(value[shaft.turns], par.slides * value[shaft.slides]) for shaft in mechanism.shafts])
+    return np.array(
+        [
+            (value[shaft.turns], *[value[name] for name in shaft.across or ("", "")], par.slides * value[shaft.slides])
+            for shaft in mechanism.shafts
+        ]
+    )
 
 
 class Bodies(NamedTuple):
@@ -94,9 +131,10 @@ def bodies(t, q, par, mechanism=CARDAN):
     lumps = len(mechanism.lumps)
     ideal = ideal_attitudes(t, par, mechanism)
     of_lumps, shafts = q[: 6 * lumps].reshape(lumps, 6), of_shafts(q[6 * lumps :], par, mechanism)
-    inside = np.concatenate([places(par, mechanism) + of_lumps[:, :3], shafts[:, 1:] * Z])
+    inside = np.concatenate([places(par, mechanism) + of_lumps[:, :3], shafts[:, 1:]])
     vectors = np.concatenate([of_lumps[:, 3:], shafts[:, :1] * Z])
-    return Bodies(np.einsum("bij,bj->bi", ideal, inside), ideal @ Rotation.from_rotvec(vectors).as_matrix())
+    position = origins(t, par, mechanism) + np.einsum("bij,bj->bi", ideal, inside)
+    return Bodies(position, ideal @ Rotation.from_rotvec(vectors).as_matrix())
 
 
 class Motion(NamedTuple):
@@ -259,7 +297,7 @@ def loads_between(now, par, mechanism):
 
     for bushing in mechanism.bushings:
         lump, base = (mechanism.bodies.index(name) for name in (bushing.lump, bushing.base))
-        kind, local = mechanism.bushing_kinds.index(bushing.kind), triads(mechanism)[lump]
+        kind, local = mechanism.bushing_kinds.index(bushing.kind), triads_of(par, mechanism)[lump]
         on_lump, on_base = par.marker[kind] @ local
         marker = position[lump] + attitude[lump] @ on_lump
         to_marker = local @ attitude[base].T
@@ -298,32 +336,58 @@ def loads_between(now, par, mechanism):
 def inertias(attitude, par, mechanism):
     """Mass, (n,), and inertia in world axes, (n, 3, 3), of each lump."""
     kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
-    axes = attitude[: len(kinds)] @ triads(mechanism).swapaxes(1, 2)
+    axes = attitude[: len(kinds)] @ triads_of(par, mechanism).swapaxes(1, 2)
     return par.mass[kinds], np.einsum("bij,bj,bkj->bik", axes, par.inertia[kinds], axes)
+
+
+def applied(t, par, mechanism):
+    """World force and torque on each lump that no other body causes: weight, and the resisting torque, (lumps, 6)."""
+    found = np.zeros((len(mechanism.lumps), 6))
+    if mechanism.placed:
+        kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
+        found[:, :3] = np.multiply.outer(par.mass[kinds], par.weight)
+    if mechanism.loaded:
+        loaded = mechanism.bodies.index(mechanism.loaded)
+        axis = ideal_attitudes(t, par, mechanism)[loaded] @ Z
+        found[loaded, 3:] = -resisting_torque(par.omega * t, par) * axis
+    return found
 
 
 def on_shafts(t, force, q, v, par, mechanism):
     """Torque or force that accelerates each unknown of shafts, its ideal acceleration apart, and its inertia."""
-    axes = ideal_attitudes(t, par, mechanism)[len(mechanism.lumps) :] @ Z
-    own = force[len(mechanism.lumps) :]
-    found = []
+    attitudes, own = ideal_attitudes(t, par, mechanism)[len(mechanism.lumps) :], force[len(mechanism.lumps) :]
+    axes, found = attitudes @ Z, []
     for u, name in enumerate(mechanism.unknowns):
         i = 6 * len(mechanism.lumps) + u
         turning = [k for k, shaft in enumerate(mechanism.shafts) if shaft.turns == name]
         sliding = [k for k, shaft in enumerate(mechanism.shafts) if shaft.slides == name]
         total = sum(own[k, 3:] @ axes[k] for k in turning) + sum(own[k, :3] @ axes[k] for k in sliding)
+        across = [(k, shaft.across.index(name)) for k, shaft in enumerate(mechanism.shafts) if name in shaft.across]
+        for k, axis in across:
+            total += across_shaft(t, q, v, k, own, par, mechanism)[axis]
         if sliding:
             total += par.F_a - par.k_a * par.slides * q[i] - par.c_a * par.slides * v[i]
         elif name == mechanism.rotations[-1]:
             total -= resisting_torque(par.omega * t, par)
-        found.append((total, par.m_s if sliding else par.Js[u]))
+        found.append((total, par.m_s if sliding or across else par.Js[u]))
     return found
+
+
+def across_shaft(t, q, v, k, own, par, mechanism):
+    """Force across shaft k along x and y of its frame: of its arms, of its unbalance, of springs in the ground."""
+    lumps = len(mechanism.lumps)
+    attitude, now = ideal_attitudes(t, par, mechanism)[lumps + k], motion(t, q, v, 0 * q, par, mechanism)
+    world = own[k, :3] - par.k_l * now.bodies.position[lumps + k] - par.c_l * now.velocity[lumps + k]
+    if mechanism.unbalance:
+        world = world + attitude @ (*par.unbalance, 0.0) * (now.spin[lumps + k] @ attitude[:, 2]) ** 2
+    return attitude.T @ world
 
 
 def imbalance(t, q, v, a, par, mechanism=CARDAN):
     """World momentum rates less forces and torques of every lump, and of shafts about and along their axes, by name."""
     now, lumps = motion(t, q, v, a, par, mechanism), len(mechanism.lumps)
     force = loads_between(now, par, mechanism).force
+    force[:lumps] += applied(t, par, mechanism)
     mass, inertia = inertias(now.bodies.attitude, par, mechanism)
     off = {}
     for b, lump in enumerate(mechanism.lumps):
@@ -335,6 +399,9 @@ def imbalance(t, q, v, a, par, mechanism=CARDAN):
         for k, shaft in enumerate(mechanism.shafts):
             if shaft.turns == name:
                 off[name] = own_inertia * now.spin_rate[lumps + k] @ axes[k] - total
+            if name in shaft.across:
+                axis = ideal_attitudes(t, par, mechanism)[lumps + k][:, shaft.across.index(name)]
+                off[name] = own_inertia * now.acceleration[lumps + k] @ axis - total
             if shaft.slides == name and par.slides:
                 off[name] = own_inertia * now.acceleration[lumps + k] @ axes[k] - total
     return off
@@ -366,6 +433,7 @@ class World:
         """Deviations q of a state in world coordinates."""
         position, quaternion, _, _, shafts = self.unpack(y)
         back = ideal_attitudes(t, self.par, self.mechanism)[: self.lumps].swapaxes(1, 2)
+        position = position - origins(t, self.par, self.mechanism)[: self.lumps]
         u = np.einsum("bij,bj->bi", back, position) - places(self.par, self.mechanism)
         phi = Rotation.from_matrix(back @ Rotation.from_quat(quaternion).as_matrix()).as_rotvec()
         return np.concatenate([np.hstack([u, phi]).ravel(), shafts[0]])
@@ -388,6 +456,7 @@ class World:
             np.zeros(0),
         )
         force = loads_between(now, par, mechanism).force
+        force[:n] += applied(t, par, mechanism)
         mass, inertia = inertias(now.bodies.attitude, par, mechanism)
         momentum = np.einsum("bij,bj->bi", inertia, spin)
         faster = np.linalg.solve(inertia, (force[:n, 3:] - np.cross(spin, momentum))[..., None])[..., 0]

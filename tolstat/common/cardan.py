@@ -81,9 +81,9 @@ def series(number: int) -> Mechanism:
 
 SERIES = series(2)
 """Two joints in series."""
-PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance")
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
-its first and its last shaft, unbalance of the last one."""
+its first and its last shaft; unbalance of the last one, and displacement of it across its axis."""
 
 
 def named(base: Mechanism, parts: Collection[str]) -> str:
@@ -94,9 +94,12 @@ def named(base: Mechanism, parts: Collection[str]) -> str:
 def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
     ends = {base.shafts[i].name for i, end in ((0, "input"), (-1, "output")) if f"{end}_bearings" in parts}
     pins = [pair.pin for pair in base.pairs] if "thrust" in parts else []
+    across = ("x", "y") if "lateral" in parts else ()
+    *first, last = (shaft._replace(borne=shaft.name in ends) for shaft in base.shafts)
     return base._replace(
         name=named(base, parts),
-        shafts=tuple(shaft._replace(borne=shaft.name in ends) for shaft in base.shafts),
+        shafts=(*first, last._replace(across=across)),
+        unknowns=(*base.unknowns, *across),
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
         unbalance="unbalance" in parts,

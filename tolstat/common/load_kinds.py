@@ -183,7 +183,8 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     T = Kind("T", "T", _ROOT, "N*m", _TORQUE, bushings, components=("T_e", "T_t", "T_z"), **bushing)
     psi = Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False)
     of_force: dict[str, Any] = {"unit": "N", "measure": F, "decides": True}
-    of_moment: dict[str, Any] = {"unit": "N*m", "measure": T, "decides": True}
+    # of placed members, the moments about their origins are small differences of large ones
+    of_moment: dict[str, Any] = {"unit": "N*m", "measure": T, "decides": not mechanism.placed}
     across: dict[str, Any] = {"places": shafts, "modulus": True}
     found = [
         F,

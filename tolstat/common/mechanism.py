@@ -16,12 +16,14 @@ from tolstat.common import elimination
 
 Integers = NDArray[np.int64]
 
-HELD, DRIVEN, CLOSED_FORM = range(3)
-"""How a member moves: not at all; about its z as the input does; as the closed form of a Cardan joint says."""
-ALONG_Z = 4
-"""Triad of a pin or hole along z, in place of a number of quarter turns: e, t, z are the member's z, x, y."""
-X, Y, Z = range(3)
-"""Axis of the frame of a hole's member, about which the pin's member turns in it."""
+HELD, DRIVEN, CLOSED_FORM, SERIES = range(4)
+"""How a member moves: not at all; about its z as the input does; as the closed form of a Cardan joint says; about its z
+by an angle that is a Fourier series of the input angle."""
+ALONG_Z, OBLIQUE = 4, 5
+"""Triad of a pin or hole, in place of a number of quarter turns: e, t, z are the member's z, x, y; as the parameters
+say."""
+X, Y, Z, GENERAL = range(4)
+"""How a pin's member moves in a hole's: it turns about an axis of both, through the origin of both; or in any way."""
 
 
 class Member(NamedTuple):
@@ -32,14 +34,18 @@ class Member(NamedTuple):
     name : str
         For the reader.
     motion : int
-        `HELD`, `DRIVEN` or `CLOSED_FORM`.
+        `HELD`, `DRIVEN`, `CLOSED_FORM` or `SERIES`.
     about_z : bool
         Whether its frame turns about its own z and its origin is at rest.
+    parent : str
+        Member in which it turns, one before it: the parameters say where. Empty where the axes of all members meet in
+        one point, and of the first member, the ground.
     """
 
     name: str
     motion: int
     about_z: bool = False
+    parent: str = ""
 
 
 class Lump(NamedTuple):
@@ -54,7 +60,7 @@ class Lump(NamedTuple):
     kind : str
         Lumps of one kind have the same mass, inertia and distance of the reference point.
     quarters : int
-        Quarter turns about z that take the member's axes to the triad (e, t, z), or `ALONG_Z`.
+        Quarter turns about z that take the member's axes to the triad (e, t, z), or `ALONG_Z`, or `OBLIQUE`.
     """
 
     name: str
@@ -74,6 +80,8 @@ class Shaft(NamedTuple):
         Whose frame it moves in.
     turns, slides : str
         Names of the unknowns psi and s; empty where it has none. Shafts with the same unknown are one body.
+    across : tuple of str
+        Names of the unknown displacements along x and y of its frame, or none.
     driven : bool
         Whether the torque about it is a load: it drives what is behind it.
     borne : bool
@@ -84,6 +92,7 @@ class Shaft(NamedTuple):
     member: str
     turns: str = ""
     slides: str = ""
+    across: tuple[str, ...] = ()
     driven: bool = False
     borne: bool = False
 
@@ -111,7 +120,7 @@ class Bushing(NamedTuple):
 
 
 class Hinge(NamedTuple):
-    """Rotation of a pin's member relative to a hole's about an axis through the origin of both.
+    """Motion of a pin's member relative to a hole's.
 
     Attributes
     ----------
@@ -120,7 +129,7 @@ class Hinge(NamedTuple):
     pin, hole : str
         The members. Those of Cardan joints come first: of each, cross in input, then cross in output.
     axis : int
-        `X`, `Y` or `Z` of both members.
+        `X`, `Y` or `Z` of both members, about which one turns in the other, or `GENERAL`.
     """
 
     name: str
@@ -174,6 +183,10 @@ class Mechanism(NamedTuple):
         Whether pins rub in their holes.
     unbalance : bool
         Whether the last shaft has an unbalance.
+    waves : int
+        Number of orders in the series of its members' angles.
+    loaded : str
+        Lump that the resisting torque acts on, against z of its member; empty: it acts on the last unknown rotation.
     """
 
     name: str
@@ -188,6 +201,13 @@ class Mechanism(NamedTuple):
     faces: tuple[Face, ...] = ()
     friction: bool = False
     unbalance: bool = False
+    waves: int = 0
+    loaded: str = ""
+
+    @property
+    def placed(self) -> int:
+        """Number of members that have a place in their parents: all or none."""
+        return len(self.members) if any(member.parent for member in self.members) else 0
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -260,7 +280,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         (unknown[name], body[bushing.lump])
         for bushing in mechanism.bushings
         if bushing.base in shafts
-        for name in (shafts[bushing.base].turns, shafts[bushing.base].slides)
+        for name in (shafts[bushing.base].turns, shafts[bushing.base].slides, *shafts[bushing.base].across)
         if name
     ]
     held = {bushing.lump: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
@@ -273,8 +293,10 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "held_by": [held[lump.name] if lump.name in held else bases[lump.name] for lump in mechanism.lumps],
         "motion": [one.motion for one in mechanism.members],
         "about_z": [one.about_z for one in mechanism.members],
+        "parent": [member.get(one.parent, -1) for one in mechanism.members],
         "turn": [unknown.get(shaft.turns, -1) for shaft in mechanism.shafts],
         "slide": [unknown.get(shaft.slides, -1) for shaft in mechanism.shafts],
+        "across": [unknown[shaft.across[0]] if shaft.across else -1 for shaft in mechanism.shafts],
         "driven": [i for i, shaft in enumerate(mechanism.shafts) if shaft.driven],
         "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
         "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],
@@ -290,6 +312,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "face_end": [face.end for face in mechanism.faces],
         "friction": mechanism.friction,
         "unbalanced": mechanism.unbalance,
+        "loaded": [body[name] for name in [mechanism.loaded] if name],
         "borne": [i for i, shaft in enumerate(mechanism.shafts) if shaft.borne],
         "first_filled": lumps + len(edges),
         "cardan": [member[name] for name in mechanism.cardan],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.fields import Field
 from tolstat.common.load_kinds import load_numbers
-from tolstat.common.mechanism import Mechanism, numbering
+from tolstat.common.mechanism import OBLIQUE, Mechanism, numbering
 
 MAX_STATIONS = 16
 """Maximum number of contact stations of a pin."""
@@ -42,6 +42,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump or bushing."""
     joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
     lumps, bushings = len(mechanism.lump_kinds), len(mechanism.bushing_kinds)
+    oblique = len(mechanism.lumps) if any(lump.quarters == OBLIQUE for lump in mechanism.lumps) else 0
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
         Field("ahead", "rad", "angle of its input fork ahead of the output fork that drives it", shape=(joints,)),
@@ -53,11 +54,28 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("torque_order", "N*m", "factors of cosine and sine of each order in T_r", shape=(MAX_ORDERS, 2)),
         Field("Js", "kg*m^2", "inertia of each shaft that turns", shape=(len(mechanism.rotations),)),
         Field("slides", "1", "1 where the output shaft may move along its axis, 0 where it is held rigidly"),
-        Field("m_s", "kg", "mass that moves along the axis of the output shaft"),
+        Field("m_s", "kg", "mass of the output shaft, which moves along its axis and across it"),
         Field("k_a", "N/m", "axial stiffness of the shafts' bearings; 0: free"),
         Field("c_a", "N*s/m", "axial damping of the output shaft"),
+        Field("k_l", "N/m", "stiffness of the shafts' bearings across the output shaft; 0: free"),
+        Field("c_l", "N*s/m", "damping across the output shaft"),
         Field("F_a", "N", "axial force on the output shaft, away from the joint"),
         Field("R", "m", "typical length: distance of the pins' and arms' reference points from O"),
+        Field("pivot", "m", "where the origin of a member is in its parent", shape=(mechanism.placed, 3)),
+        Field(
+            "mount", "1", "axes, by columns, of a member in its parent at the angle 0", shape=(mechanism.placed, 3, 3)
+        ),
+        Field("angle", "rad, 1", "angle of a member at theta = 0, and its turns by theta", shape=(mechanism.placed, 2)),
+        Field(
+            "wave",
+            "rad",
+            "factors of cosine and sine of each order of theta in the angle",
+            shape=(mechanism.placed, mechanism.waves, 2),
+        ),
+        Field(
+            "weight", "m/s^2", "acceleration by gravity, in axes of the ground", shape=(3 if mechanism.placed else 0,)
+        ),
+        Field("triad", "1", "oblique triads: rows e, t, z of each lump in axes of its member", shape=(oblique, 3, 3)),
         Field("mass", "kg", "mass of a lump", shape=(lumps,)),
         Field("inertia", "kg*m^2", "inertia of a lump about e, t, z", shape=(lumps, 3)),
         Field("at", "m", "reference point of a lump in its member, along e, t, z", shape=(lumps, 3)),

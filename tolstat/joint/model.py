@@ -21,12 +21,12 @@ from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
-from tolstat.joint.sections import Arm, Bushing, Cross, Friction, Hub, Material, Pin, Shaft, Thrust
+from tolstat.joint.sections import RIGID, Arm, Bushing, Cross, Friction, Hub, Material, Pin, Shaft, Thrust
 
 GIVEN_BY = dict(
     zip(
         PARTS,
-        ("thrust", "friction.mu", "shaft.input", "shaft.output", "shaft.unbalance"),
+        ("thrust", "friction.mu", "shaft.input", "shaft.output", "shaft.unbalance", "shaft.lateral"),
         strict=True,
     )
 )
@@ -89,7 +89,7 @@ class Joint(Strict):
     cross: Cross
     hub: Hub = Field(default=Hub(), validate_default=True)
     shaft: Shaft
-    thrust: Thrust | None = None
+    thrust: Thrust | None = Field(default=None, validate_default=True)
     """Thrust faces, which hold the cross along its pins; without this table pins slide freely along their holes"""
     friction: Friction = Friction()
     bushing: Bushing
@@ -116,6 +116,15 @@ class Joint(Strict):
         if lacking:
             raise refuse(*_lacking(lacking, section))
         return section
+
+    @field_validator("thrust")
+    @classmethod
+    def _holds_the_shaft(cls, value: Thrust | None, info: ValidationInfo) -> Thrust | None:
+        shaft = info.data.get("shaft")
+        if value is None and shaft is not None and shaft.lateral != RIGID:
+            found = "missing, and shaft.lateral is not rigid: pins that slide freely hold no shaft across its axis"
+            raise refuse(found, 'give [joint.thrust] with end_play and k, or shaft.lateral = "rigid"')
+        return value
 
     @field_validator("cross")
     @classmethod
@@ -206,7 +215,7 @@ class Joint(Strict):
     @property
     def parts(self) -> tuple[str, ...]:
         """What the joint has beside lumps, bushings and pairs: those of `GIVEN_BY` whose key it has."""
-        return tuple(part for part, key in GIVEN_BY.items() if attrgetter(key)(self) is not None)
+        return tuple(part for part, key in GIVEN_BY.items() if attrgetter(key)(self) not in (None, RIGID))
 
     @property
     def k_cross(self) -> Array:

@@ -24,7 +24,7 @@ from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import Arm, Bushing, Pin
+from tolstat.joint.sections import RIGID, Arm, Bushing, Pin
 
 Table = NDArray[np.void]
 
@@ -250,7 +250,9 @@ def _constants(joint: Joint) -> dict[str, Any]:
             (-1, 2),
         ),
         "slides": shaft.slides,
-        "m_s": shaft.mass if shaft.slides else 0.0,
+        "m_s": shaft.mass if shaft.slides or shaft.lateral != RIGID else 0.0,
+        "k_l": shaft.k_l,
+        "c_l": 2 * joint.bushing.xi * math.sqrt(shaft.k_l * (shaft.mass or 0.0)),
         "k_a": shaft.k_a,
         "c_a": shaft.axial_damping if shaft.slides else 0.0,
         "c_d": contact.c_d,

@@ -222,7 +222,7 @@ class Shaft(Strict):
     Js: units.Inertia
     """inertia of the output shaft about its axis"""
     mass: units.Mass | None = None
-    """mass that moves along the axis; needed unless `axial` is rigid"""
+    """mass that moves along and across the axis; needed unless `axial` and `lateral` are rigid"""
     axial_damping: units.Damping | None = None
     """damping of the motion along the axis, as by grease; needed unless `axial` is rigid"""
     axial: Annotated[float | str, units.Quantity("N/m", words=(RIGID, FREE)), POSITIVE] = Field(
@@ -230,12 +230,24 @@ class Shaft(Strict):
     )
     """what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose bearing; or the
     stiffness of the bearings of both shafts in series"""
+    lateral: Annotated[float | str, units.Quantity("N/m", words=(RIGID, FREE)), POSITIVE] = Field(
+        default=RIGID, examples=[FREE]
+    )
+    """what holds the output shaft across its axis, which does not tilt: `rigid`; `free`, as one that only the joint
+    carries; or the stiffness of its bearings. Needs thrust faces: without them pins slide, and nothing holds it"""
     input: Ends | None = None
     """Bearings of the input shaft, whose loads become known"""
     output: Ends | None = None
     """Bearings of the output shaft, whose loads become known"""
     unbalance: Unbalance | None = None
     """Unbalance of the output shaft"""
+
+    @field_validator("lateral")
+    @classmethod
+    def _has_mass(cls, value: float | str, info: ValidationInfo) -> float | str:
+        if value != RIGID and info.data.get("mass", 0.0) is None:
+            raise refuse("a shaft that moves across its axis needs mass", 'give mass = "5 kg" with your value')
+        return value
 
     @field_validator("axial")
     @classmethod
@@ -251,6 +263,11 @@ class Shaft(Strict):
     def slides(self) -> bool:
         """Whether the shaft may move along its axis."""
         return self.axial != RIGID
+
+    @property
+    def k_l(self) -> float:
+        """Lateral stiffness of the output shaft's bearings, N/m; 0 where the shaft is free, and where it is rigid."""
+        return 0.0 if isinstance(self.lateral, str) else self.lateral
 
     @property
     def k_a(self) -> float:

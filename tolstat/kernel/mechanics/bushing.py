@@ -17,7 +17,7 @@ def markers(i, par):
 
 @njit
 def is_lump(body, par):
-    """Whether a body has six unknowns; shafts turn about z of their member at most, and may slide along it."""
+    """Whether a body has six unknowns; shafts turn about z of their member at most, and may move without tilting."""
     return body < par.lump_kind.shape[0]
 
 
@@ -45,6 +45,8 @@ def carried(base, lever, par, work):
     if is_lump(base, par):
         return add(row(work.vel, base), cross(row(work.spin, base), lever))
     w = work.spin[base, 2]
+    if par.across[base - par.lump_kind.shape[0]] >= 0:
+        return (work.vel[base, 0] - w * lever[1], work.vel[base, 1] + w * lever[0], work.vel[base, 2])
     return (-w * lever[1], w * lever[0], work.vel[base, 2])
 
 

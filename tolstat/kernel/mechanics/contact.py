@@ -10,7 +10,7 @@ import math
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode as ContactMode
 from tolstat.kernel.mechanics.bushing import accumulate
-from tolstat.kernel.mechanics.motion import to_hole, to_pin, velocity_in
+from tolstat.kernel.mechanics.motion import point_to_hole, point_to_pin, to_hole, to_pin, velocity_in
 from tolstat.kernel.mechanics.spring import elastic, has_needles
 from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
@@ -53,7 +53,7 @@ def in_hole(pin, lever, par, work):
     `lever`: from the pin's reference point, in axes of the pin's member, m.
     """
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
-    point = to_hole(hinge, add(row(work.pos, body), lever), par, work)
+    point = point_to_hole(hinge, add(row(work.pos, body), lever), par, work)
     velocity = to_hole(hinge, add(row(work.vel, body), cross(row(work.spin, body), lever)), par, work)
     velocity = velocity_in(hinge, velocity, point, par, work)
     hole_lever = sub(point, row(work.pos, hole))
@@ -66,7 +66,7 @@ def push(pin, point, f_hole, par, work):
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     accumulate(work.force, hole, f_hole, cross(sub(point, row(work.pos, hole)), f_hole))
     f_pin = scale(-1.0, to_pin(hinge, f_hole, par, work))
-    lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
+    lever = sub(point_to_pin(hinge, point, par, work), row(work.pos, body))
     accumulate(work.force, body, f_pin, cross(lever, f_pin))
 
 

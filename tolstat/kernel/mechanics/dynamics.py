@@ -48,6 +48,10 @@ def set_bodies(q, v, par, work):
         if par.slide[shaft] >= 0:
             shifted = (par.slides * q[slide], par.slides * v[slide])
         place_shaft(lumps + shaft, turned, shifted, work)
+        if par.across[shaft] >= 0:
+            for k in range(2):
+                i = 6 * lumps + par.across[shaft] + k
+                work.pos[lumps + shaft, k], work.vel[lumps + shaft, k] = q[i], v[i]
 
 
 @njit
@@ -78,6 +82,8 @@ def forces(t, q, v, par, work):
     for body in range(work.force.shape[0]):
         for k in range(6):
             work.force[body, k] = 0.0
+    if par.pivot.shape[0] > 0:
+        weigh(par, work)
     for i in range(work.load.shape[0]):
         bushing_load(i, par, work)
     for pin in range(work.contact.shape[0]):
@@ -87,6 +93,17 @@ def forces(t, q, v, par, work):
     if par.friction == 1:
         for pin in range(work.contact.shape[0]):
             rub(pin, par, work)
+
+
+@njit
+def weigh(par, work):
+    """Add the weight of every lump."""
+    g = (par.weight[0], par.weight[1], par.weight[2])
+    for body in range(par.lump_kind.shape[0]):
+        mass, _ = mass_of(body, par)
+        f = scale(mass, turn_back(work.attitude, par.frame[body], g))
+        for k in range(3):
+            work.force[body, k] += f[k]
 
 
 @njit
@@ -118,6 +135,43 @@ def axial_force(shaft, q, v, par, work):
 
 
 @njit
+def lateral_force(body, par, work):
+    """Force across a shaft that accelerates it, N, along x and y: of its arms, of its unbalance and of the bearings."""
+    x, y = bearing_force(body, par, work)
+    u_x, u_y = unbalance_force(body, par, work)
+    return work.force[body, 0] + u_x - x, work.force[body, 1] + u_y - y
+
+
+@njit
+def bearing_force(body, par, work):
+    """Force of a shaft that is not held across on its bearings, N, along x and y: k_l and c_l rest in the ground."""
+    turning = work.frame_w[par.frame[body], 2]
+    x, y = work.pos[body, 0], work.pos[body, 1]
+    return (
+        par.k_l * x + par.c_l * (work.vel[body, 0] - turning * y),
+        par.k_l * y + par.c_l * (work.vel[body, 1] + turning * x),
+    )
+
+
+@njit
+def unbalance_force(body, par, work):
+    """Force of the unbalance of the last shaft, N, along x and y of its frame; 0 of others."""
+    speed = work.frame_w[par.frame[body], 2]
+    if par.unbalanced == 1 and body == work.force.shape[0] - 1:
+        return par.unbalance[0] * speed * speed, par.unbalance[1] * speed * speed
+    return 0.0 * speed, 0.0 * speed
+
+
+@njit
+def turning_across(body, par, work):
+    """What the turning of the frame adds to the acceleration of a shaft along x and y, m/s^2."""
+    turning, change = work.frame_w[par.frame[body], 2], work.frame_dw[par.frame[body], 2]
+    x, y = work.pos[body, 0], work.pos[body, 1]
+    along, across = 2 * work.vel[body, 0] - turning * y, 2 * work.vel[body, 1] + turning * x
+    return -turning * across - change * y, turning * along + change * x
+
+
+@njit
 def in_turning_frame(body, x, dx, w, a, par, work):
     """Absolute acceleration, angular velocity and angular acceleration of a lump, in axes of its ideal frame.
 
@@ -129,6 +183,8 @@ def in_turning_frame(body, x, dx, w, a, par, work):
         omega, domega = row(work.frame_w, member), row(work.frame_dw, member)
         centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
         acceleration = add(add(ddx, centripetal), cross(domega, x))
+        if par.pivot.shape[0] > 0:
+            acceleration = add(acceleration, row(work.origin_a, member))
         return acceleration, add(omega, w), add(add(domega, dw), cross(omega, w))
     turning, change = work.frame_w[member, 2], work.frame_dw[member, 2]
     along, across = 2 * dx[0] - turning * x[1], 2 * dx[1] + turning * x[0]
@@ -175,6 +231,9 @@ def residual(t, q, v, a, par, options, work, out):
     """
     forces(t, q, v, par, work)
     lumps, rotations = par.lump_kind.shape[0], par.Js.shape[0]
+    resisting = resisting_torque(t, par, work, options.start == RAMP)
+    for i in range(par.loaded.shape[0]):
+        work.force[par.loaded[i], 5] -= resisting
     for body in range(lumps):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
@@ -183,7 +242,6 @@ def residual(t, q, v, a, par, options, work, out):
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
             out[i + 3 + k] = torque[k] - work.force[body, 3 + k]
-    resisting = resisting_torque(t, par, work, options.start == RAMP)
     for u in range(rotations):
         torque_of_arms, change = turning_torque(u, par, work)
         i = 6 * lumps + u
@@ -194,6 +252,11 @@ def residual(t, q, v, a, par, options, work, out):
         if par.slide[shaft] >= 0:
             i = 6 * lumps + par.slide[shaft]
             out[i] = par.slides * par.m_s * a[i] - axial_force(shaft, q, v, par, work)
+        if par.across[shaft] >= 0:
+            i, force = 6 * lumps + par.across[shaft], lateral_force(lumps + shaft, par, work)
+            added = turning_across(lumps + shaft, par, work)
+            out[i] = par.m_s * (a[i] + added[0]) - force[0]
+            out[i + 1] = par.m_s * (a[i + 1] + added[1]) - force[1]
 
 
 @njit
@@ -202,6 +265,9 @@ def acceleration(t, q, v, par, options, work, out):
     forces(t, q, v, par, work)
     lumps, rotations = par.lump_kind.shape[0], par.Js.shape[0]
     zero = (0.0, 0.0, 0.0)
+    resisting = resisting_torque(t, par, work, options.start == RAMP)
+    for i in range(par.loaded.shape[0]):
+        work.force[par.loaded[i], 5] -= resisting
     for body in range(lumps):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
@@ -214,7 +280,6 @@ def acceleration(t, q, v, par, options, work, out):
         for k in range(3):
             out[i + k] = (work.force[body, k] - f[k]) / mass
             out[i + 3 + k] = ddphi[k]
-    resisting = resisting_torque(t, par, work, options.start == RAMP)
     for u in range(rotations):
         total, change = turning_torque(u, par, work)
         if u == rotations - 1:
@@ -224,3 +289,7 @@ def acceleration(t, q, v, par, options, work, out):
         if par.slide[shaft] >= 0:
             along = axial_force(shaft, q, v, par, work) / where(par.slides > 0, par.m_s, 1.0)
             out[6 * lumps + par.slide[shaft]] = along
+        if par.across[shaft] >= 0:
+            i, force = 6 * lumps + par.across[shaft], lateral_force(lumps + shaft, par, work)
+            added = turning_across(lumps + shaft, par, work)
+            out[i], out[i + 1] = force[0] / par.m_s - added[0], force[1] / par.m_s - added[1]

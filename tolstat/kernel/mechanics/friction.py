@@ -3,7 +3,7 @@
 import math
 
 from tolstat.kernel.mechanics.contact import in_hole, push
-from tolstat.kernel.mechanics.motion import to_pin
+from tolstat.kernel.mechanics.motion import point_to_pin
 from tolstat.kernel.mechanics.vector import axpy, choose, cross, dot, row, scale, sub
 from tolstat.kernel.mechanics.work import DAMPING, FORCE, NORMAL, POINT, SLOPE, TANGENT
 from tolstat.kernel.simd.jit import njit
@@ -26,7 +26,7 @@ def rub(pin, par, work):
             continue
         normal = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
         point = (station[POINT], station[POINT + 1], station[POINT + 2])
-        surface = to_pin(hinge, axpy(par.friction_radius, normal, point), par, work)
+        surface = point_to_pin(hinge, axpy(par.friction_radius, normal, point), par, work)
         point, velocity = in_hole(pin, sub(surface, row(work.pos, body)), par, work)
         w = axpy(-dot(velocity, normal), normal, velocity)
         square = dot(w, w)

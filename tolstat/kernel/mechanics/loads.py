@@ -6,7 +6,8 @@ They follow from what `dynamics.forces` or `ideal_loads` has written to the work
 import math
 
 from tolstat.common.load_kinds import CONTACTS
-from tolstat.kernel.mechanics.vector import row
+from tolstat.kernel.mechanics.dynamics import bearing_force, unbalance_force
+from tolstat.kernel.mechanics.vector import row, turn
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
@@ -23,8 +24,8 @@ OF_FORCES, OF_TORQUES = range(2)
 def shaft_load(shaft, par, work):
     """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
 
-    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a. Across it, its
-    unbalance adds to the force.
+    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a; across one that is
+    not held across likewise. Across one that is held, its unbalance adds to the force.
 
     Parameters
     ----------
@@ -40,10 +41,11 @@ def shaft_load(shaft, par, work):
         s, rate = work.pos[body, 2], work.vel[body, 2]
         z = where(par.slides > 0, par.k_a * s + par.c_a * rate - par.F_a, z)
         m_x, m_y = m_x - s * y, m_y + s * x
-    if par.unbalanced == 1 and shaft == par.turn.shape[0] - 1:
-        speed = work.frame_w[par.frame[body], 2]
-        x += par.unbalance[0] * speed * speed
-        y += par.unbalance[1] * speed * speed
+    if par.across[shaft] >= 0:
+        x, y = bearing_force(body, par, work)
+    elif par.unbalanced == 1:
+        u_x, u_y = unbalance_force(body, par, work)
+        x, y = x + u_x, y + u_y
     return (x, y, z), (m_x, m_y, m_z)
 
 
@@ -129,9 +131,11 @@ def complete_loads(par, work):
         cosine, sine = work.turned[member, 0], work.turned[member, 1]
         first = 0
         for x, y, z in shaft_load(shaft, par, work):
-            work.shafts[shaft, first] = cosine * x - sine * y
-            work.shafts[shaft, first + 1] = sine * x + cosine * y
-            work.shafts[shaft, first + 2] = z
+            in_ground = (cosine * x - sine * y, sine * x + cosine * y, z)
+            if par.pivot.shape[0] > 0:
+                in_ground = turn(work.attitude, member, (x, y, z))
+            for k in range(3):
+                work.shafts[shaft, first + k] = in_ground[k]
             first += 3
 
 

@@ -1,8 +1,10 @@
 """Ideal motion of the members (docs/model.md, "Frames"); the unknowns are deviations from it."""
 
-from tolstat.common.mechanism import DRIVEN, HELD, X, Y
+from tolstat.common.mechanism import DRIVEN, GENERAL, HELD, X, Y
 from tolstat.kernel.mechanics.cardan import write_joints
+from tolstat.kernel.mechanics.placed import place_members, relate
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
+from tolstat.kernel.mechanics.vector import add, cross, row, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
 
 
@@ -52,6 +54,8 @@ def ideal_motion(phase, par, work):
     theta, slope, bend, torque = drive_and_load(phase, par)
     omega, domega = par.omega * slope, par.omega * par.omega * bend
     work.drive[0], work.drive[1], work.drive[2] = omega, domega, torque
+    if par.pivot.shape[0] > 0:
+        place_members(theta, par, work)
     for member in range(par.motion.shape[0]):
         if par.motion[member] == HELD:
             set_turning(member, (1.0 + 0.0 * theta, 0.0 * theta), (0.0 * theta, 0.0 * theta), work)
@@ -63,6 +67,9 @@ def ideal_motion(phase, par, work):
         write_joints(theta, par, work)
     for hinge in range(2 * joints, par.hinge_axis.shape[0]):
         pin, hole = par.hinge_pin[hinge], par.hinge_hole[hinge]
+        if par.hinge_axis[hinge] == GENERAL:
+            relate(hinge, par, work)
+            continue
         c, s, c0, s0 = work.turned[pin, 0], work.turned[pin, 1], work.turned[hole, 0], work.turned[hole, 1]
         work.relative[hinge, 0], work.relative[hinge, 1] = c * c0 + s * s0, s * c0 - c * s0
         work.relative[hinge, 2] = work.frame_w[pin, 2] - work.frame_w[hole, 2]
@@ -97,6 +104,8 @@ def to_hole(hinge, a, par, work):
         return (a[0], c * a[1] - s * a[2], s * a[1] + c * a[2])
     if axis == Y:
         return (c * a[0] + s * a[2], a[1], c * a[2] - s * a[0])
+    if axis == GENERAL:
+        return turn(work.into_hole, hinge, a)
     return (c * a[0] - s * a[1], s * a[0] + c * a[1], a[2])
 
 
@@ -108,7 +117,25 @@ def to_pin(hinge, a, par, work):
         return (a[0], c * a[1] + s * a[2], c * a[2] - s * a[1])
     if axis == Y:
         return (c * a[0] - s * a[2], a[1], s * a[0] + c * a[2])
+    if axis == GENERAL:
+        return turn_back(work.into_hole, hinge, a)
     return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
+
+
+@njit
+def point_to_hole(hinge, point, par, work):
+    """Place of a point in a hole's member, in its axes, by its place in the pin's."""
+    if par.hinge_axis[hinge] == GENERAL:
+        return add(turn(work.into_hole, hinge, point), row(work.place, hinge))
+    return to_hole(hinge, point, par, work)
+
+
+@njit
+def point_to_pin(hinge, point, par, work):
+    """Place of a point in a pin's member, in its axes, by its place in the hole's."""
+    if par.hinge_axis[hinge] == GENERAL:
+        return turn_back(work.into_hole, hinge, sub(point, row(work.place, hinge)))
+    return to_pin(hinge, point, par, work)
 
 
 @njit
@@ -118,6 +145,9 @@ def velocity_in(hinge, velocity, point, par, work):
     `point`: where it is, m.
     """
     w, axis = work.relative[hinge, 2], par.hinge_axis[hinge]
+    if axis == GENERAL:
+        lever = sub(point, row(work.place, hinge))
+        return add(add(velocity, row(work.place_v, hinge)), cross(row(work.relative_w, hinge), lever))
     if axis == X:
         return (velocity[0], velocity[1] - w * point[2], velocity[2] + w * point[1])
     if axis == Y:

@@ -6,11 +6,11 @@ motion of pins and hub together changes no cross bushing load. Neglected terms, 
 beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
 """
 
-from tolstat.common.mechanism import ALONG_Z
+from tolstat.common.mechanism import ALONG_Z, OBLIQUE
 from tolstat.kernel.mechanics.bushing import is_lump, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
-from tolstat.kernel.mechanics.motion import to_pin
-from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn
+from tolstat.kernel.mechanics.motion import point_to_pin, to_pin
+from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, of_row, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
     DAMPING,
     DELTA,
@@ -45,11 +45,14 @@ def clear(par, work):
 def spread(matrices, i, body, k, par):
     """Columns of R diag(k) R^T, R being matrix `i` of `matrices`; `k`: along the triad of `body`."""
     x, y, z = k
+    columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
     if par.quarters[body] == ALONG_Z:
         x, y, z = k[1], k[2], k[0]
+    elif par.quarters[body] == OBLIQUE:
+        e, t, n = of_row(par.triad, body, 0), of_row(par.triad, body, 1), of_row(par.triad, body, 2)
+        columns = turn(matrices, i, e), turn(matrices, i, t), turn(matrices, i, n)
     elif par.quarters[body] % 2 == 1:
         x, y = k[1], k[0]
-    columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
     return (
         _spread_column(columns, (x * columns[0][0], y * columns[1][0], z * columns[2][0])),
         _spread_column(columns, (x * columns[0][1], y * columns[1][1], z * columns[2][1])),
@@ -171,6 +174,16 @@ def bushing_tangent(i, cv, par, work):
         connect_shaft(slide, lump, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
         work.corner[rotation, slide] += slides * by_base[2][2]
         work.corner[slide, slide] += slides * a[2][2]
+    across = par.across[base - par.lump_kind.shape[0]]
+    if across >= 0:
+        rows = transposed(by_lump)
+        for k in range(2):
+            connect_shaft(across + k, lump, a[k], rows[k], work.edge)
+            work.corner[rotation, across + k] += by_base[2][k]
+            if slide >= 0:
+                work.corner[slide, across + k] += par.slides * a[2][k]
+            for n in range(k, 2):
+                work.corner[across + k, across + n] += a[n][k]
 
 
 @njit
@@ -186,7 +199,7 @@ def _directions(pin, station, par, work):
     """Write d(displacements of `station`, a row of stations, along n and m) / d(pin, hole) to ``work.vectors``."""
     body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
-    lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
+    lever = sub(point_to_pin(hinge, point, par, work), row(work.pos, body))
     hole_lever = sub(point, row(work.pos, hole))
     for k, first in ((0, NORMAL), (1, TANGENT)):
         u = (station[first], station[first + 1], station[first + 2])
@@ -282,5 +295,9 @@ def assemble(cv, ca, cv_axial, par, work):
     for u in range(rotations):
         work.corner[u, u] += ca * par.Js[u]
     support = ca * par.m_s + cv_axial * par.c_a + par.k_a
-    for u in range(rotations, work.corner.shape[0]):
-        work.corner[u, u] += where(par.slides > 0, support, 1.0)
+    for shaft in range(par.slide.shape[0]):
+        if par.slide[shaft] >= 0:
+            work.corner[par.slide[shaft], par.slide[shaft]] += where(par.slides > 0, support, 1.0)
+        if par.across[shaft] >= 0:
+            for u in range(par.across[shaft], par.across[shaft] + 2):
+                work.corner[u, u] += ca * par.m_s + cv * par.c_l + par.k_l

@@ -1,6 +1,7 @@
-"""Components along the lumps' triads (e, t, z): frame axes after quarter turns, so nothing is multiplied."""
+"""Components along the lumps' triads (e, t, z): frame axes after quarter turns, where nothing is multiplied, or any."""
 
-from tolstat.common.mechanism import ALONG_Z
+from tolstat.common.mechanism import ALONG_Z, OBLIQUE
+from tolstat.kernel.mechanics.vector import turn, turn_back
 from tolstat.kernel.simd.jit import njit
 
 
@@ -10,6 +11,8 @@ def to_triad(body, a, par):
     quarters = par.quarters[body]
     if quarters == ALONG_Z:
         return (a[2], a[0], a[1])
+    if quarters == OBLIQUE:
+        return turn(par.triad, body, a)
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = y, -x
@@ -24,6 +27,8 @@ def from_triad(body, a, par):
     quarters = par.quarters[body]
     if quarters == ALONG_Z:
         return (a[1], a[2], a[0])
+    if quarters == OBLIQUE:
+        return turn_back(par.triad, body, a)
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = -y, x

@@ -11,7 +11,7 @@ import numpy as np
 
 from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import sizes
-from tolstat.common.mechanism import blocks_of
+from tolstat.common.mechanism import GENERAL, blocks_of
 from tolstat.common.parameters import MAX_STATIONS
 
 # columns of work.station
@@ -28,12 +28,22 @@ def work_fields(mechanism):
     """
     members, lumps, shafts = len(mechanism.members), len(mechanism.lumps), len(mechanism.shafts)
     bodies, pairs, border = lumps + shafts, len(mechanism.pairs), len(mechanism.unknowns)
+    general = len(mechanism.hinges) if any(hinge.axis == GENERAL for hinge in mechanism.hinges) else 0
     return {
         "frame_w": (members, 3),  # angular velocity of each member in its own axes
         "frame_dw": (members, 3),  # its derivative
         "relative": (len(mechanism.hinges), 3),  # pin's member in the hole's: cosine, sine of the angle, its rate
         "drive": (3,),  # angular velocity and acceleration of the input; resisting torque, without the ramp
         "turned": (members, 2),  # of those that turn about z: cosine and sine of their angle
+        "attitude": (mechanism.placed, 3, 3),  # of members with a place, in axes of the ground
+        "origin": (mechanism.placed, 3),  # in axes of the ground
+        "origin_v": (mechanism.placed, 3),  # its velocity
+        "origin_a": (mechanism.placed, 3),  # its acceleration in axes of the member
+        # general motion of pins' members in holes': rotation, place, their rates
+        "into_hole": (general, 3, 3),
+        "place": (general, 3),
+        "place_v": (general, 3),
+        "relative_w": (general, 3),
         "pos": (bodies, 3),  # X + u
         "vel": (bodies, 3),  # u'
         "rot": (bodies, 3, 3),  # exp(phi x)

@@ -39,7 +39,10 @@ def inside_model(par):
         good = good and math.hypot(par.torque_order[i, 0], par.torque_order[i, 1]) < 1e300
     good = good and swing < 1
     for kind in range(par.k.shape[0]):
-        good = good and par.k[kind, 0] > 0
+        total = 0.0
+        for k in range(6):
+            total += par.k[kind, k]
+        good = good and total > 0
     good = good and par.needle_b >= 0
     bears = False
     for j in range(par.n_stations):

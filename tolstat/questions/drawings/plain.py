@@ -79,6 +79,8 @@ def frames(mechanism: Mechanism, row: Any) -> list[Group]:
     """
     work, groups = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0], list[Group]()
     ideal_motion(0.0, row, work)
+    if mechanism.placed:
+        return [{one.name: Frame(work.origin[i], work.attitude[i]) for i, one in enumerate(mechanism.members)}]
     for i, first in enumerate(mechanism.members):
         if any(first.name in group for group in groups):
             continue

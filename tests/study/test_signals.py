@@ -111,7 +111,7 @@ def test_faults_of_a_signal_come_together(tmp_path):
     with pytest.raises(InputError) as caught:
         load(tmp_path, ONE.replace('torque = "100 N*m"', SIGNAL), REST, "[grid]\n")
     text = str(caught.value)
-    for found in ("csv:1: time: has no unit", "csv:1: speed: [kg] is no unit", "csv:3: speed: 'x'", "2 samples"):
+    for found in ("csv:1: time: has no unit", "csv:1: speed: [kg] is no unit", "csv:3: speed: 'x'", "2 rows below it"):
         assert found in text
     assert "study.toml" in text  # and the study's own
 

@@ -106,8 +106,8 @@ def test_nothing_is_written_of_a_signal_or_a_base_with_faults(tmp_path):
     write(signal, "time [s],torque [N*m]", n, n)
     done = new(path, "--signal", signal)
     assert done.exit_code == 2
-    assert "has no column speed" in done.stderr
-    assert "has no column alpha" in done.stderr
+    assert "signal.csv:2: has no column 'speed', 'alpha'" in done.stderr
+    assert "add the headers speed [rpm], alpha [deg]" in done.stderr
     base = ROOT / "studies" / "duty_cycle.toml"  # has limits at a point of its own
     done = new(path, "--signal", SIGNAL, "--base", base)
     assert done.exit_code == 2

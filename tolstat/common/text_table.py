@@ -72,32 +72,30 @@ class TextTable:
     def __init__(self, path: Path) -> None:
         self.path, self._faults = path, list[tuple[int, Fault]]()
         lines = list(StringIO(strict.read_text(path, utf_16=True), newline=""))
-        is_comment = [line.lstrip().startswith("#") for line in lines]
-        first = next((line for line, out in zip(lines, is_comment, strict=True) if line.strip() and not out), "")
-        self.separator = next((mark for mark in "\t;" if mark in re.sub('"[^"]*"', "", first)), ",")
-        records = self._records(["\n" if out else line for line, out in zip(lines, is_comment, strict=True)])
-        self.head, header = records[0] if records else (1, [])
+        comments = {line: text for line, text in enumerate(lines, start=1) if text.lstrip().startswith("#")}
+        lines = ["\n" if line in comments else text for line, text in enumerate(lines, start=1)]
+        first = re.sub('"[^"]*"', "", next((text for text in lines if text.strip()), ""))
+        self.separator = next((mark for mark in "\t;" if mark in first), ",")
+        (self.head, header), *records = self._records(lines) or [(1, [])]
         self.columns: dict[str, int] = {}
         self.units: dict[str, str] = {}
-        self._marks: dict[str, tuple[int, str]] = {}
         for index, cell in enumerate(header):
             name, unit = _HEAD.fullmatch(cell).groups("")  # type: ignore[union-attr]  # it matches any text
             if name in self.columns:
                 self.fault(self.head, name, "is there twice", "rename or remove one of the columns")
             if name:
                 self.columns[name], self.units[name] = index, unit
-        remedy = "give a cell for each column"
-        if self.separator == ",":
-            remedy += "; write decimals with a point, or separate cells by semicolons"
-        for line, cells in records[1:]:
-            if len(cells) != len(header):
-                self.fault(line, "", f"has {len(cells)} cells, the header {len(header)}", remedy)
-        for line, (text, out) in enumerate(zip(lines, is_comment, strict=True), start=1):
-            if out and line > self.head and 1 < len(header) == text.count(self.separator) + 1:
+        self.rows = [(line, cells) for line, cells in records if len(cells) == len(header)]
+        self._refused = [(line, len(cells)) for line, cells in records if len(cells) != len(header)]
+        self._marks: dict[str, tuple[int, str]] = {}
+        decimals = "; write decimals with a point, or separate cells by semicolons" if self.separator == "," else ""
+        for line, number in self._refused:
+            found = f"has {number} cells, the header {len(header)}"
+            self.fault(line, "", found, f"give a cell for each column{decimals}")
+        for line, text in comments.items():
+            if line > self.head and 1 < len(header) == text.count(self.separator) + 1:
                 remedy = "remove the line, or its #; put comments above the header"
                 self.fault(line, "", "begins with # and has as many cells as the header", remedy)
-        self.rows = [(line, cells) for line, cells in records[1:] if len(cells) == len(header)]
-        self._refused = len(records[1:]) - len(self.rows)
 
     def _records(self, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
         """Cells of each row that has text, and its first line."""
@@ -117,20 +115,23 @@ class TextTable:
         """Add a fault of a line, and of its column `name` unless that is empty."""
         self._faults.append((line, Fault(f"{self.path}:{line}{f': {name}' if name else ''}", found, remedy)))
 
+    def faults(self) -> list[Fault]:
+        """Faults that were found, in the order of the lines."""
+        if len(self._marks) > 1:
+            (first, one), (second, other) = sorted(self._marks.values())
+            found = f"{other!r} has another decimal mark than {one!r} in line {first}"
+            self.fault(second, "", found, "write all decimals alike, and no thousands separators")
+        return [fault for _, fault in sorted(self._faults, key=itemgetter(0))]
+
     def check(self) -> None:
-        """Raise the faults that were found, the first `SHOWN` of them in words.
+        """Raise the faults that were found, see `shortened`.
 
         Raises
         ------
         InputError
             When there are any.
         """
-        if len(self._marks) > 1:
-            (first, one), (second, other) = sorted(self._marks.values())
-            found = f"{other!r} has another decimal mark than {one!r} in line {first}"
-            self.fault(second, "", found, "write all decimals alike, and no thousands separators")
-        faults = [fault for _, fault in sorted(self._faults, key=itemgetter(0))]
-        raise_all(shortened(faults, self.path))
+        raise_all(shortened(self.faults(), self.path))
 
     def number(self, line: int, cell: str) -> float:
         """Finite number in a cell; NaN where there is none."""
@@ -185,7 +186,7 @@ class TextTable:
             (line, cells), name = self.rows[row], list(columns)[column]
             remedy = "give a number, without unit and thousands separators"
             self.fault(line, name, f"{cells[columns[name]]!r} is no finite number", remedy)
-        if (number := len(self.rows) + self._refused) < least:
+        if (number := len(self.rows) + len(self._refused)) < least:
             self.fault(self.head, "", f"has {number} rows below it", f"give at least {least}")
         return {
             name: self._factor(line_of_units, name, si[name], (unit_of or {}).get(name, "")) * values[:, column]

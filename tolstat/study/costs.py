@@ -140,7 +140,9 @@ def of(tolerances: Sequence[Tolerance], mechanism: Mechanism, path: Path | None 
     if path.suffix.lower() == ".toml":
         table, lines = strict.read_toml(path), read_input(path)
     else:
-        table, lines = _rows(TextTable(path), faults)
+        source = TextTable(path)
+        table, lines = _rows(source)
+        faults += source.faults()
     tolerance_of = {name: tolerance for tolerance in tolerances for name in tolerance.names}
     costs: dict[str, CostEntry] = {}
     claims = selection.Assignments(str(path), mechanism)
@@ -182,8 +184,8 @@ def _of_features(
     return {feature: found.get(feature, CostEntry(cost=0.0, keep=True)) for feature in features(tolerance)}
 
 
-def _rows(table: TextTable, faults: list[Fault]) -> tuple[dict[str, dict[str, object]], dict[str, int]]:
-    """Entry of each row of a text table as TOML would give it, and its line; faults are added."""
+def _rows(table: TextTable) -> tuple[dict[str, dict[str, object]], dict[str, int]]:
+    """Entry of each row of a text table as TOML would give it, and its line."""
     table.numbers({}, ["tolerance"], 1)
     rows, lines = dict[str, dict[str, object]](), dict[str, int]()
     for line, cells in table.rows:
@@ -192,10 +194,9 @@ def _rows(table: TextTable, faults: list[Fault]) -> tuple[dict[str, dict[str, ob
         if name in lines:
             remedy = f"keep one of them: the other is in line {lines[name]}"
             table.fault(line, "", f"has a second row of {name!r}", remedy)
-        rows[name] = {key: _value(table, line, cell, table.units[key]) for key, cell in row.items()}
-        lines[name] = line
-    with gather(faults):
-        table.check()
+        else:
+            rows[name] = {key: _value(table, line, cell, table.units[key]) for key, cell in row.items()}
+            lines[name] = line
     return rows, lines
 
 

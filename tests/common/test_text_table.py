@@ -77,7 +77,13 @@ def test_columns_in_any_order_and_units(path: Path) -> None:
     ("text", "expected"),
     [
         ("tilt,part\n0,21,A\n", ["2: has 3 cells, the header 2"]),  # no decimal comma where commas separate
-        ("tilt\n0,21\n", ["2: has 2 cells, the header 1"]),
+        (
+            "tilt\n0,21\n",
+            [
+                "2: has 2 cells, the header 1\n  hint: give a cell for each column; write decimals with a point, or "
+                "separate cells by semicolons"
+            ],
+        ),
         ('tilt,part\n"0,21",A\n', ["2: tilt: '0,21' is no finite number"]),
         ("tilt;part\n0.21;A\n1.234,5;B\n", ["3: tilt: '1.234,5' is no finite number"]),
         ("tilt;part\n1,234.5;A\n1 234;B\n", ["2: tilt: '1,234.5' is no", "3: tilt: '1 234' is no"]),
@@ -109,8 +115,7 @@ def test_faults_come_at_once_with_their_lines(path: Path) -> None:
         "1: has no column 'E_factor', 'speed'\n  hint: add the headers E_factor, speed [rpm]; there are tilt, offset",
         "2: tilt: [N] is no unit of it\n  hint: write its unit into the header: tilt [deg]",
         "3: offset: 'x' is no finite number\n  hint: give a number, without unit and thousands separators",
-        "4: has 2 cells, the header 3\n  hint: give a cell for each column; write decimals with a point, or separate "
-        "cells by semicolons",
+        "4: has 2 cells, the header 3\n  hint: give a cell for each column",
         "6: tilt: 'nan' is no finite number\n  hint: give a number, without unit and thousands separators",
     ]
 

@@ -88,10 +88,11 @@ class TextTable:
         self.rows = [(line, cells) for line, cells in records if len(cells) == len(header)]
         self._refused = [(line, len(cells)) for line, cells in records if len(cells) != len(header)]
         self._marks: dict[str, tuple[int, str]] = {}
-        decimals = "; write decimals with a point, or separate cells by semicolons" if self.separator == "," else ""
         for line, number in self._refused:
-            found = f"has {number} cells, the header {len(header)}"
-            self.fault(line, "", found, f"give a cell for each column{decimals}")
+            remedy = "give a cell for each column"
+            if self.separator == "," and number > len(header):
+                remedy += "; write decimals with a point, or separate cells by semicolons"
+            self.fault(line, "", f"has {number} cells, the header {len(header)}", remedy)
         for line, text in comments.items():
             if line > self.head and 1 < len(header) == text.count(self.separator) + 1:
                 remedy = "remove the line, or its #; put comments above the header"

@@ -104,7 +104,7 @@ def test_measured_parts_of_another_encoding(folder: Path) -> None:
     (folder / "parts.csv").write_bytes("Durchmesser in µm\n1\n2\n3\n".encode("cp1252"))
     entry = '"pin*.offset_[tz]" = { distribution = "measured", file = "parts.csv", column = "x", unit = "um" }\n'
     (message,) = refused(folder, STUDY.replace(STUDY.splitlines(keepends=True)[7], entry))
-    assert "parts.csv is not UTF-8 text: line 1 has another encoding" in message
+    assert "parts.csv: is not UTF-8 text: line 1 has another encoding" in message
     assert message.endswith("hint: save it as UTF-8")
 
 

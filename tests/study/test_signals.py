@@ -111,7 +111,7 @@ def test_faults_of_a_signal_come_together(tmp_path):
     with pytest.raises(InputError) as caught:
         load(tmp_path, ONE.replace('torque = "100 N*m"', SIGNAL), REST, "[grid]\n")
     text = str(caught.value)
-    for found in ("csv:1: time: has no unit", "csv:1: speed: [kg] is no unit", "csv:3: speed: 'x'", "2 samples"):
+    for found in ("csv:1: time: has no unit", "csv:1: speed: [kg] is no unit", "csv:3: speed: 'x'", "2 rows below it"):
         assert found in text
     assert "study.toml" in text  # and the study's own
 
@@ -143,3 +143,31 @@ def test_signals_need_an_angle_and_a_speed_that_turns(tmp_path):
     write(path, "time [s],speed [rpm]", n, n)
     with pytest.raises(InputError, match="above zero"):
         signals.orders_of(path, "speed")
+
+
+def test_time_and_angle_must_rise(tmp_path):
+    path = tmp_path / "a.csv"
+    write(path, "time [s],angle [deg]", [0, 1, 1, 2, 1.5, 3, 4, 5, 6], [0, 10, 20, 20, 30, 40, 50, 60, 70])
+    with pytest.raises(InputError) as caught:
+        signals.read(path)
+    found = [str(fault).removeprefix(f"{path}:").split("\n")[0] for fault in caught.value.faults]
+    assert found == ["5: time: does not rise", "6: angle: does not rise", "7: time: does not rise"]
+
+
+def test_a_gap_is_named_and_orders_are_of_the_longest_part(tmp_path):
+    time, _, speed, torque = made()
+    part = slice(0, 900)
+    write(
+        tmp_path / "engine.csv",
+        "time [s],speed [rpm],torque [N*m]",
+        np.append(time[part], time + 5.0),
+        np.append(speed[part], speed) * 30 / np.pi,
+        np.append(torque[part], torque),
+    )
+    text = ONE.replace('torque = "100 N*m"', SIGNAL).replace('speed = "500 rpm"', 'speed = { file = "engine.csv" }')
+    study = load(tmp_path, text, REST)
+    assert [order.n for order in study.operation.torque_orders] == [2, 6]
+    assert [order.amplitude for order in study.operation.torque_orders] == pytest.approx([40.0, 5.0], rel=1e-3)
+    (note,) = [note for note in study.signals if "gap" in note]
+    assert "engine.csv:903: gap of 4.95" in note
+    assert "orders are of the longest part without a gap" in note

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import runpy
 
 import numpy as np
@@ -106,8 +107,8 @@ def test_nothing_is_written_of_a_signal_or_a_base_with_faults(tmp_path):
     write(signal, "time [s],torque [N*m]", n, n)
     done = new(path, "--signal", signal)
     assert done.exit_code == 2
-    assert "has no column speed" in done.stderr
-    assert "has no column alpha" in done.stderr
+    assert "signal.csv:2: has no column 'speed', 'alpha'" in done.stderr
+    assert "add the headers speed [rpm], alpha [deg]" in done.stderr
     base = ROOT / "studies" / "duty_cycle.toml"  # has limits at a point of its own
     done = new(path, "--signal", SIGNAL, "--base", base)
     assert done.exit_code == 2
@@ -121,3 +122,37 @@ def test_the_signal_of_studies_is_made_by_the_script(tmp_path, monkeypatch):
     made["main"]()
     assert (tmp_path / "a.csv").read_text() == SIGNAL.read_text()
     assert "not measured" in SIGNAL.read_text().partition("\n")[0]
+
+
+def test_a_pause_of_the_logger_is_no_driven_time(tmp_path):
+    time, torque, speed, alpha = steps((60, 100, 600, 10), (1, 400, 300, 10), (60, 100, 600, 10), rate=10.0)
+    paused = time + np.where(np.arange(len(time)) > 605, 8 * 3600.0, 0.0)
+    without, found = (spectra.duty_cycle(t, torque, speed, alpha, 3.0) for t in (time, paused))
+    # the samples beside the pause, of 0.1 s each, have half of their time
+    np.testing.assert_allclose(found.time, without.time, atol=0.1 / 121)
+    assert found.time.min() < 0.01
+    path = tmp_path / "signal.csv"
+    write(path, "time [s],torque [N*m],speed [rpm]", paused, torque, speed / RPM)
+    done = new(tmp_path / "cycle.toml", "--signal", path, "--alpha", "10 deg")
+    assert done.exit_code == 0
+    told = " ".join(done.stderr.split())
+    assert "signal.csv:609: gap of 28800.1 s after the time 60.5 s, which is not counted" in told
+    made = study.load(tmp_path / "cycle.toml")
+    assert min(point.share for point in made.points) < 0.01
+    assert {round(math.degrees(point.operation.alpha), 6) for point in made.points} == {10.0}
+
+
+def test_a_misalignment_is_given_once(tmp_path):
+    path, signal = tmp_path / "cycle.toml", tmp_path / "signal.csv"
+    n = np.arange(20.0)
+    write(signal, "time [s],torque [N*m],speed [rpm]", n, n, n)
+    done = new(path, "--signal", signal)
+    assert 'add the headers alpha [deg], or give --alpha "9 deg"; there are time, torque, speed' in done.stderr
+    for angle in ("9", "90 deg", "9 mm"):
+        done = new(path, "--signal", signal, "--alpha", angle)
+        assert done.exit_code == 2
+        assert "--alpha" in done.stderr
+    done = new(path, "--signal", SIGNAL, "--alpha", "9 deg")
+    assert "alpha: is there and given, too" in done.stderr
+    assert new(path, "--alpha", "9 deg").exit_code == 2
+    assert not path.exists()

@@ -149,14 +149,22 @@ def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
     site = Site("pin1.offset_t", "m", 0.0, tmp_path)
     dist = entry(parts, site, "study.toml", ("tolerances",)).quantities(site)[site.name]
     np.testing.assert_allclose(dist.ppf(np.array([0.1, 0.5, 0.9])), [-1e-5, 5e-6, 1.5e-5], rtol=1e-12)
-    assert "no column 'dv'" in faults(parts | {"column": "dv"}, folder=tmp_path)
-    assert "did you mean 'dev'" in faults(parts | {"column": "dv"}, folder=tmp_path)
+    lacking = faults(parts | {"column": "dv"}, folder=tmp_path)
+    assert "parts.csv:2: has no column 'dv'" in lacking
+    assert "there are part, dev" in lacking
     assert "cannot be read" in faults(parts | {"file": "nowhere.csv"}, folder=tmp_path)
     assert "'1 deg' cannot be a value in m" in faults(parts | {"unit": "deg"}, folder=tmp_path)
     (tmp_path / "parts.csv").write_text("dev\n1\nnan\n", encoding="utf-8")
-    assert "row 2 of 'dev' is 'nan'" in faults(parts, folder=tmp_path)
+    assert "parts.csv:3: dev: 'nan' is no finite number" in faults(parts, folder=tmp_path)
     (tmp_path / "parts.csv").write_text("dev\n1\n", encoding="utf-8")
-    assert "at least two" in faults(parts, folder=tmp_path)
+    assert "give at least 2" in faults(parts, folder=tmp_path)
+    (tmp_path / "parts.csv").write_text("dev [mm]\n1\n2\n", encoding="utf-8")
+    assert "unit is 'um', but" in faults(parts, folder=tmp_path)
+    del parts["unit"]
+    dist = entry(parts, site, "study.toml", ("tolerances",)).quantities(site)[site.name]
+    assert dist.values.tolist() == [0.001, 0.002]
+    (tmp_path / "parts.csv").write_text("dev\n1\n2\n", encoding="utf-8")
+    assert "parts.csv:1: dev: has no unit" in faults(parts, folder=tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ import numpy as np
 
 from tolstat.analysis import binomial
 from tolstat.campaign.pool import kept_workers
+from tolstat.common import text_table
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
-from tolstat.common.files import finite
 from tolstat.common.loads import ANY_LIMIT, AT, Limit, load_of, units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
@@ -184,7 +184,7 @@ def parse(
     match = _STATEMENT.fullmatch(text)
     if match is None or match["what"] != what:
         raise input_error(option, f"{text!r} is not a rule", example)
-    bound = finite(match["bound"])
+    bound = text_table.number(match["bound"])
     with collected() as faults:
         with gather(faults):
             limit = limit_of(match["limit"], limits, mechanism, option, example)

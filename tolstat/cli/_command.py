@@ -237,10 +237,10 @@ def function_of(question: Question) -> Callable[..., None]:
         sources: list[Path] = [arguments[name] for name in READS[reads]]
         stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
         point, study_file, out = arguments.get("point") or "", arguments.get("study_file"), arguments["out"]
-        only_study = question.study and out is not None and out.suffix == ".toml"
+        only_study = question.study and out is not None and out.suffix.lower() == ".toml"
         if out is not None:
             check_target(out if only_study else out / stem, *sources)
-        is_study = simulate is not None and sources[0].suffix == ".toml"
+        is_study = simulate is not None and sources[0].suffix.lower() == ".toml"
         if simulate is not None and (is_study or question.at_once or arguments.get("run")):
             what: Any = sources[0]
             if is_study:
@@ -259,7 +259,7 @@ def function_of(question: Question) -> Callable[..., None]:
             seen = [store.view(study_file).at(point) for store in opened]
             with progress(question.name):
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
-            target = out and (out.with_suffix("") if only_study else out / stem)
+            target = out and (out if only_study else out / stem)
             deliver(answer, arguments["wide"], arguments["as_json"], target, only_study)
 
     out_option = options.FolderOrStudy if question.study else options.Results if takes_study else options.Folder

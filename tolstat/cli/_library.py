@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tolstat.campaign import work as works
     from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
+    from tolstat.common import text_table as text_tables
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
     from tolstat.joint import sections
@@ -40,13 +41,13 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("common.columns", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
-    columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
+    names = ("columns", "loads", "strict", "tables", "text_table", "units")
+    columns, load_units, strict, tables, text_tables, units = (Late(f"tolstat.common.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
     joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
-    names = ("report.answer", "report.page", "solver.compilation")
-    reports, page, compilation = (Late(f"tolstat.{name}") for name in names)
+    names = ("report.answer", "report.page", "solver.compilation", "joint.sections")
+    reports, page, compilation, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
     names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")

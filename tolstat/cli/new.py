@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -16,6 +17,8 @@ from tolstat.display.options import Opt
 
 EXPONENT = 3.0
 """Default Wöhler exponent."""
+RIGHT = 0.5 * math.pi
+"""Right angle, rad."""
 
 
 def new(
@@ -23,6 +26,7 @@ def new(
     *,
     joint: Annotated[str | None, Opt("JOINT")] = None,
     signal: Annotated[Path | None, Opt("CSV")] = None,
+    alpha: Annotated[float | None, Opt("ANGLE", least=-RIGHT, most=RIGHT, unit="rad")] = None,
     exponent: Annotated[float | None, Opt("M", least=1.0, most=20.0)] = None,
     base: Annotated[Path | None, Opt("STUDY")] = None,
 ) -> None:
@@ -46,15 +50,17 @@ def new(
         own: write a joint file, too; or a joint that comes with tolstat; default: cirelli2021.
     signal : Path, optional
         Measured signal (CSV) of which the operating points are made.
+    alpha : float, optional
+        Misalignment of a signal that has no column alpha; "9 deg".
     exponent : float, optional
         Wöhler exponent of the signal's damage, which is proportional to the torque to this power; default: 3.
     base : Path, optional
         Study file (TOML) whose operating points those of the signal replace; default: the study of tolstat new.
     """
-    path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
+    path = name if name.suffix.lower() == ".toml" else name.with_name(f"{name.name}.toml")
     faults: list[Fault] = []
-    if signal is None and (base is not None or exponent is not None):
-        faults.append(Fault("--base, --exponent", "are about a measured signal", "give it, too: --signal CSV"))
+    if signal is None and any(value is not None for value in (alpha, base, exponent)):
+        faults.append(Fault("--alpha, --base, --exponent", "are about a measured signal", "give it, too: --signal CSV"))
     if signal is not None and joint is not None:
         faults.append(Fault("--joint", "cannot be used together with --signal", "name a study with the joint: --base"))
     if signal is not None and path.exists():
@@ -65,15 +71,15 @@ def new(
     if signal is None:
         files = starter.write(path, joint or "cirelli2021")
     else:
-        files = [_write_cycle(path, signal, exponent or EXPONENT, base)]
+        files = [_write_cycle(path, signal, alpha, exponent or EXPONENT, base)]
     for file in files:
         say(f"wrote {file}")
     say(f"next: tolstat plan {quote(str(path))}")
 
 
-def _write_cycle(path: Path, signal: Path, exponent: float, base: Path | None) -> Path:
+def _write_cycle(path: Path, signal: Path, alpha: float | None, exponent: float, base: Path | None) -> Path:
     """Write the study of the duty cycle in a signal, and print the duty cycle."""
-    cycle = spectra.read(signal, exponent)
+    cycle = spectra.read(signal, exponent, alpha)
     content = spectra.text(cycle, signal, path, base)
     studies.load(path, text=content)  # its faults, before anything is written
     text.write(content, path)
@@ -83,6 +89,8 @@ def _write_cycle(path: Path, signal: Path, exponent: float, base: Path | None) -
         operation = f"{np.degrees(alpha):.4g} deg", f"{speed * 30 / np.pi:.4g} rpm", f"{torque:.4g} N m"
         rows.append((name, *operation, text.percent(time), text.percent(damage)))
     typer.echo(text.align(rows))
+    for gap in cycle.gaps:
+        say(f"{gap}, which is not counted")
     share, rest = text.percent(1.0 - cycle.time.sum()), text.percent(max(0.0, 1.0 - cycle.damage.sum()))
     what = f"{rest} of the damage by revolutions (exponent {exponent:g})"
     say(f"left out: {share} of the time in which the shaft turns, with {what}")

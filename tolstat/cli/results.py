@@ -186,7 +186,7 @@ def verify(
 
 
 def _mechanism_of(what: Path) -> Mechanism:
-    if what.suffix == ".toml":
+    if what.suffix.lower() == ".toml":
         return library.studies.load(what).mechanism
     with library.stores.ResultFile.open(what) as store:
         return store.mechanism

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
-from collections.abc import Mapping, Sequence
-from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,12 +12,10 @@ from tolstat.cli import _library as library
 from tolstat.cli._library import np
 from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write, write_frame
 from tolstat.common.errors import Fault, gather, raise_all
-from tolstat.common.files import check_target, finite
+from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
 FORMATS = (".svg", ".png", ".pdf")
-MAX_FAULTS = 20
-"""Most faults of a table that a message lists."""
 
 
 def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: AsJson = False) -> None:
@@ -132,7 +127,7 @@ def evaluate(
 ) -> None:
     """Simulate joints whose errors another program gives.
 
-    The first line of the CSV file has the names of errors, in any order; the second their units, or SI units hold.
+    The header of the CSV file has the names of errors, in any order; units stand there or below, or SI units hold.
     Errors are deviations, those of operation.* from the operating point, as tolstat export writes them. The errors
     in which joints of STUDY differ must be there; others that are not are those of STUDY. If STUDY has several
     joints, a column variant says which. Other columns are left out and named. The output has a row for each joint in
@@ -158,8 +153,10 @@ def evaluate(
         check_target(Path(out), errors)
     f = library.function.function(library.studies.load(study), loads, point=point, workers=workers)
     names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
-    columns, others = read_table(errors, names, units)
-    if others:
+    table = library.text_tables.TextTable(errors)
+    columns = table.numbers(units, names, 1, units)
+    table.check()
+    if others := [name for name in table.columns if name not in columns]:
         of_results = {column.name for column in library.columns.result_columns(f.study.mechanism)}
         results = [name for name in others if name in of_results]
         listed = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
@@ -178,71 +175,6 @@ def evaluate(
         say(f"{int((invalid == state).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")
         if hint:
             say(f"  hint: {hint}")
-
-
-def read_table(
-    path: Path, needed: Sequence[str], units: Mapping[str, str]
-) -> tuple[dict[str, library.load_units.FloatArray], list[str]]:
-    """Read columns of a CSV file: names in the first line, and units in the second if a cell of it is no number.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    needed : sequence of str
-        Columns that it must have.
-    units : mapping of str to str
-        Columns that are read if it has them, and the SI unit of each; others are left out.
-
-    Returns
-    -------
-    columns : dict of str to ndarray, (n,)
-        SI.
-    others : list of str
-        Columns that are left out.
-
-    Raises
-    ------
-    InputError
-        With the faults of the file: columns that it lacks or has twice, units, cells that are no finite numbers.
-    """
-    lines = csv.reader(StringIO(library.strict.read_text(path), newline=""))
-    rows = [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(cell.strip() for cell in row)]
-    head = rows.pop(0)[1] if rows else []
-    faults = [
-        Fault(f"{path}:1", f"{'more than one' if name in head else 'no'} column {name!r}", "give one for each error")
-        for name in dict.fromkeys([*needed, *units])
-        if head.count(name) > 1 or (name in needed and name not in head)
-    ]
-    columns = {name: head.index(name) for name in units if name in head}
-    for line, cells in rows:
-        if len(cells) != len(head):
-            length = f"has {len(cells)} cells, the first line {len(head)}"
-            faults.append(Fault(f"{path}:{line}", length, "give a cell for each column"))
-    rows = [(line, cells) for line, cells in rows if len(cells) == len(head)]
-    factors = dict.fromkeys(columns, 1.0)
-    if rows and any(math.isnan(finite(rows[0][1][column])) for column in columns.values()):
-        line, cells = rows.pop(0)
-        for name, column in columns.items():
-            unit = cells[column]
-            try:
-                factors[name] = library.units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, units[name])
-            except ValueError:
-                remedy = f"write {units[name]}, or another such unit"
-                faults.append(Fault(f"{path}:{line}: {name}", f"{unit!r} is no unit of it", remedy))
-    if not rows and not faults:
-        faults.append(Fault(str(path), "has no joints", "give a row of numbers for each"))
-    values = np.array([[finite(cells[column]) for column in columns.values()] for _, cells in rows])
-    for i, j in np.argwhere(np.isnan(values)):
-        (line, cells), name = rows[i], list(columns)[j]
-        problem = f"{cells[columns[name]]!r} is no finite number"
-        faults.append(Fault(f"{path}:{line}: {name}", problem, "give the error of this joint"))
-    if len(faults) > MAX_FAULTS:
-        rest = Fault(str(path), f"and {len(faults) - MAX_FAULTS} more faults", "mend these first")
-        faults = [*faults[:MAX_FAULTS], rest]
-    raise_all(faults)
-    by_name = {name: values[:, number] * factors[name] for number, name in enumerate(columns)}
-    return by_name, [name for name in head if name not in columns]
 
 
 def show(
@@ -295,6 +227,6 @@ def show(
             library.drawings.draw_joint(joint, alphas, title, columns),
             library.drawings.lengths(joint, alphas),
         )
-    (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
+    (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix,))
     typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])
     say(f"wrote {path}")

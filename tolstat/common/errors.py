@@ -72,8 +72,8 @@ def collected() -> Iterator[list[Fault]]:
 
 
 def raise_all(faults: Iterable[Fault]) -> None:
-    """Raise an `InputError` with all faults, if there are any."""
-    if every := tuple(faults):
+    """Raise an `InputError` with all faults, each once, if there are any."""
+    if every := tuple(dict.fromkeys(faults)):
         raise InputError(every)
 
 

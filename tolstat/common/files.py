@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import math
 import os
 import re
 import secrets
@@ -46,8 +45,10 @@ def reason(error: OSError) -> str:
     return of_system[1] if of_system else " ".join(str(error).split())
 
 
-def read_input(path: Path) -> str:
+def read_input(path: Path, utf_16: bool = False) -> str:
     """Read a text file that a user names; the mark that some editors put before UTF-8 text is left out.
+
+    With `utf_16`, it may also be UTF-16 text with its mark.
 
     Raises
     ------
@@ -67,19 +68,12 @@ def read_input(path: Path) -> str:
         content = file.read(MAX_INPUT_BYTES + 1)
     if len(content) > MAX_INPUT_BYTES:
         raise OSError(errno.EFBIG, f"is larger than {MAX_INPUT_BYTES / 1e6:g} MB", str(path))
+    if utf_16 and content.startswith(UTF_16):
+        return content.decode("utf-16")
     if b"\0" in content:
         at = content.index(b"\0")
         raise UnicodeDecodeError("utf-8", content, at, at + 1, "zero byte")
     return content.decode("utf-8-sig")
-
-
-def finite(cell: str | None) -> float:
-    """Number in a cell of a CSV file; NaN where there is no finite one."""
-    try:
-        value = float(cell or "")
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:

@@ -63,8 +63,8 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         raise input_error(path, "has too many tables and lists inside each other", remedy) from error
 
 
-def read_text(path: Path) -> str:
-    """Read the text of an input file.
+def read_text(path: Path, utf_16: bool = False) -> str:
+    """Read the text of an input file, see `read_input`.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_text(path: Path) -> str:
         When the file cannot be read or is not UTF-8.
     """
     try:
-        return read_input(path)
+        return read_input(path, utf_16)
     except OSError as error:
         reason = error.strerror or str(error)
         raise input_error(path, f"cannot be read: {reason}", "check the path and its permissions") from error
@@ -95,7 +95,7 @@ def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
     return section
 
 
-def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
+def with_lines(faults: Sequence[Fault], place: str, text: str | Mapping[str, int]) -> list[Fault]:
     """Add the line to the place of each fault of a file.
 
     Parameters
@@ -104,8 +104,8 @@ def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
         Faults of this file and of others, which stay as they are.
     place : str
         What stands before the key path in the places of this file's faults.
-    text : str
-        The file's text, which is TOML.
+    text : str or mapping of str to int
+        The file's text, which is TOML, or the line of each key path.
 
     Returns
     -------
@@ -113,8 +113,9 @@ def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
         ``study.toml:12: sampling.n`` for ``study.toml: sampling.n``. A missing key has the line of the innermost table
         around it that the file has; a fault without key path has no line.
     """
-    lines = {dotted(path): line for path, line in toml_lines.of_keys(text).items()}
-    return [_with_line(fault, place, lines) for fault in faults]
+    if isinstance(text, str):
+        text = {dotted(path): line for path, line in toml_lines.of_keys(text).items()}
+    return [_with_line(fault, place, text) for fault in faults]
 
 
 def _with_line(fault: Fault, place: str, lines: Mapping[str, int]) -> Fault:

@@ -133,10 +133,13 @@ class Answer:
                 files.append(text.write(part.text(path), path))
         return files
 
-    def write_documents(self, stem: Path) -> list[Path]:
-        """Write the documents alone, see `write`."""
+    def write_documents(self, path: Path) -> list[Path]:
+        """Write the documents alone, see `write`; the ending of `path`, if it has one, is written as it is there."""
         documents = [part for part in self.parts if isinstance(part, Document)]
-        return replace(self, parts=documents).write(stem)
+        documents = [
+            replace(part, ending=path.suffix) if part.ending == path.suffix.lower() else part for part in documents
+        ]
+        return replace(self, parts=documents).write(path.with_suffix(""))
 
     def _repr_html_(self) -> str:
         from tolstat.display import html

@@ -160,7 +160,7 @@ def _find(base: object, place: str, relative_to: Path | None) -> Path:
     if not isinstance(base, str | Path):
         raise input_error(place, f"{base!r} is not a text", "give a name in data/joints or a path")
     path = Path(base)
-    if path.suffix == ".toml" or len(path.parts) > 1:
+    if path.suffix.lower() == ".toml" or len(path.parts) > 1:
         return (relative_to or Path()) / path
     folder = data_dir() / "joints"
     names = sorted(p.stem for p in folder.glob("*.toml"))

@@ -1,4 +1,4 @@
-"""Cost of a tolerance of a feature as a reciprocal power, with coefficients from TOML or CSV.
+"""Cost of a tolerance of a feature as a reciprocal power, with coefficients from TOML or a text table.
 
 A tolerance t costs c(t) = fixed + (cost - fixed) (at / t)^power. The power 1 is the reciprocal model of Chase and
 Greenwood (1988, Design issues in mechanical tolerance analysis), 2 that of Spotts (1973), any other Sutherland and
@@ -7,20 +7,19 @@ Roth's (1975).
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from io import StringIO
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
-from tolstat.common.files import finite, read_input
+from tolstat.common.errors import Fault, gather, raise_all
+from tolstat.common.files import read_input
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
+from tolstat.common.text_table import TextTable, shortened
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.entry import OF_ERROR
@@ -118,7 +117,7 @@ def of(tolerances: Sequence[Tolerance], mechanism: Mechanism, path: Path | None 
     mechanism : Mechanism
         Whose errors they are of.
     path : Path, optional
-        TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or CSV file with a
+        TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or text table with a
         column ``tolerance`` of such names and the entries' keys as further columns. A feature is named by one of the
         errors of its tolerance or by all; tolerances of features that the file does not name are kept. Without a file
         each tolerance costs 1 per feature, and 1 / f if made f times as wide.
@@ -135,10 +134,17 @@ def of(tolerances: Sequence[Tolerance], mechanism: Mechanism, path: Path | None 
     """
     if path is None:
         return [Cost(t.width, dict.fromkeys(features(t), CostEntry())) for t in tolerances]
-    table = _read_csv(path) if path.suffix == ".csv" else strict.read_toml(path)
+    faults: list[Fault] = []
+    table: Mapping[str, object]
+    lines: str | Mapping[str, int]
+    if path.suffix.lower() == ".toml":
+        table, lines = strict.read_toml(path), read_input(path)
+    else:
+        source = TextTable(path)
+        table, lines = _rows(source)
+        faults += source.faults()
     tolerance_of = {name: tolerance for tolerance in tolerances for name in tolerance.names}
     costs: dict[str, CostEntry] = {}
-    faults: list[Fault] = []
     claims = selection.Assignments(str(path), mechanism)
     known = {name: tolerance.site.unit for name, tolerance in tolerance_of.items()}
     for entry in selection.entries(table, mechanism):
@@ -148,9 +154,7 @@ def of(tolerances: Sequence[Tolerance], mechanism: Mechanism, path: Path | None 
             context = {"tolerance": tolerance_of[names[0]]}
             cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
             costs |= dict.fromkeys(names, cost)
-    if faults:
-        toml = path.suffix != ".csv"
-        raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
+    raise_all(shortened(strict.with_lines(faults, str(path), lines), path))
     read = [Cost(t.width, _of_features(t, costs, str(path), faults)) for t in tolerances]
     raise_all(faults)
     raise_all(
@@ -180,24 +184,28 @@ def _of_features(
     return {feature: found.get(feature, CostEntry(cost=0.0, keep=True)) for feature in features(tolerance)}
 
 
-def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
-    try:
-        rows = list(csv.DictReader(StringIO(strict.read_text(path)), restval=""))
-    except csv.Error as error:
-        raise input_error(path, f"cannot be read: {error}", "give a TOML or CSV file") from error
-    if not rows or "tolerance" not in rows[0]:
-        raise input_error(path, "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")
-    raise_all(
-        Fault(f"{path}: row {number}", "has more cells than the header line", "write decimals with a point: 0.5")
-        for number, row in enumerate(rows, start=2)
-        if None in row
-    )
-    return {row.pop("tolerance"): {key: _value(cell) for key, cell in row.items() if cell} for row in rows}
+def _rows(table: TextTable) -> tuple[dict[str, dict[str, object]], dict[str, int]]:
+    """Entry of each row of a text table as TOML would give it, and its line."""
+    table.numbers({}, ["tolerance"], 1)
+    rows, lines = dict[str, dict[str, object]](), dict[str, int]()
+    for line, cells in table.rows:
+        row = {name: cells[column] for name, column in table.columns.items() if cells[column]}
+        name = row.pop("tolerance", "")
+        if name in lines:
+            remedy = f"keep one of them: the other is in line {lines[name]}"
+            table.fault(line, "", f"has a second row of {name!r}", remedy)
+        else:
+            rows[name] = {key: _value(table, line, cell, table.units[key]) for key, cell in row.items()}
+            lines[name] = line
+    return rows, lines
 
 
-def _value(cell: str) -> object:
-    """Convert a cell of a CSV file to the value that TOML would give."""
-    if cell in ("true", "false"):
-        return cell == "true"
-    value = finite(cell)
-    return cell if math.isnan(value) else value
+def _value(table: TextTable, line: int, cell: str, unit: str) -> object:
+    """Convert a cell to the value that TOML would give."""
+    if cell.lower() in ("true", "false"):
+        return cell.lower() == "true"
+    digits, _, own = cell.partition(" ")
+    value = table.number(line, digits)
+    if math.isnan(value):
+        return cell
+    return f"{value!r} {own or unit}" if own or unit else value

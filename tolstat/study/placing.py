@@ -76,6 +76,6 @@ def _files(data: Any) -> Iterator[tuple[KeyPath, str]]:
         value = reduce(getitem, path, data)
         if not isinstance(value, str):
             continue
-        is_path = value.endswith(".toml") or len(Path(value).parts) > 1
+        is_path = value.lower().endswith(".toml") or len(Path(value).parts) > 1
         if path[-1] == "file" or (path[-2:] == ("joint", "base") and is_path):
             yield path, value

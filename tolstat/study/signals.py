@@ -1,10 +1,8 @@
-"""Measured signals of a drive: CSV files, and the orders of speed and torque that a study takes from them."""
+"""Measured signals of a drive: text files, and the orders of speed and torque that a study takes from them."""
 
 from __future__ import annotations
 
-import csv
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from operator import getitem
@@ -13,14 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, gather, input_error, raise_all
-from tolstat.common.files import finite
+from tolstat.common.errors import Fault, gather, input_error
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
-from tolstat.common.strict import dotted, read_text
+from tolstat.common.strict import dotted
+from tolstat.common.text_table import TextTable
 from tolstat.common.toml_lines import KeyPath, paths
 from tolstat.display.text import percent
 from tolstat.study import rewriting
@@ -29,10 +26,8 @@ UNITS = {"time": "s", "angle": "rad", "speed": "rad/s", "torque": "N*m", "alpha"
 """SI unit of each column that a signal may have; others are ignored."""
 WRITTEN = {"speed": ("rad/s", "rpm", "%"), "torque": ("N*m", "N*m", "N*m")}
 """SI unit of a key of an operating point, unit in which its mean is written, and unit of an amplitude."""
-HEADS = {"time": "s", "angle": "deg", "speed": "rpm", "torque": "N*m", "alpha": "deg"}
-"""Unit of each column that a remedy proposes."""
-SHOWN = 20
-"""Maximum number of faults of a file that are shown."""
+GAP = 10.0
+"""Smallest time between samples that is a gap, relative to the median."""
 SMALLEST = 0.01
 """Smallest order that is kept, relative to the largest."""
 MOST = 16
@@ -46,77 +41,68 @@ PER_WAVE = 4
 FINEST = 512
 """Maximum number of equal parts of a revolution that a signal is resampled to."""
 TURN = 2.0 * np.pi
-_HEAD = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
 
 Table = dict[str, Any]
 
 
-def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
+class Signal(NamedTuple):
+    """A measured signal.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, (n,)
+        Those of `UNITS` that it has, by name, SI; an angle may begin anew after each revolution in the file, not here.
+    gaps : tuple of str
+        Place and length of each gap, see `durations`.
+    """
+
+    columns: dict[str, FloatArray]
+    gaps: tuple[str, ...]
+
+
+def read(path: Path, needed: Sequence[str] = (), alpha: float | None = None) -> Signal:
     """Read a measured signal.
 
     Parameters
     ----------
     path : Path
-        CSV: a header line such as ``time [s], speed [rpm], torque [N*m]``, then a line for each sample; lines that
-        begin with # are ignored.
+        Text table: a header such as ``time [s], speed [rpm], torque [N*m]``, then a line for each sample.
     needed : sequence of str
         Columns that it must have.
-
-    Returns
-    -------
-    dict
-        Columns of `UNITS` by name, SI, (n,) each; an angle may begin anew after each revolution in the file, not here.
+    alpha : float, optional
+        Misalignment of a signal without a column of it, rad.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    lines = list(enumerate(csv.reader(read_text(path).splitlines()), start=1))
-    lines = [(number, cells) for number, cells in lines if cells and not cells[0].lstrip().startswith("#")]
-    faults: list[Fault] = []
-    head, cells_of = lines[0] if lines else (1, [])
-    columns: dict[str, tuple[int, float]] = {}
-    for column, cell in enumerate(cells_of):
-        match = _HEAD.fullmatch(cell)
-        if match is None or match[1] not in UNITS:
-            continue
-        name = match[1]
-        if name in columns:
-            faults.append(Fault(f"{path}:{head}: {name}", "is there twice", "rename one of the columns"))
-        try:
-            columns[name] = column, units.to_si(f"1 {match[2] or ''}", UNITS[name])
-        except PydanticCustomError:
-            columns[name] = column, math.nan
-            found = "has no unit" if not match[2] else f"[{match[2]}] is no unit of it"
-            faults.append(Fault(f"{path}:{head}: {name}", found, f"write the header {name} [{HEADS[name]}]"))
-    for name in needed:
-        if name not in columns:
-            remedy = f"add one with the header {name} [{HEADS[name]}]"
-            faults.append(Fault(f"{path}:{head}", f"has no column {name}", remedy))
-    numbers = [number for number, _ in lines[1:]]
-    cells_by_name = {
-        name: [cells[column] if column < len(cells) else None for _, cells in lines[1:]]
-        for name, (column, _) in columns.items()
-    }
-    values = {name: np.array([finite(cell) for cell in cells]) for name, cells in cells_by_name.items()}
-    for name, cells in cells_by_name.items():
-        for row in np.flatnonzero(np.isnan(values[name])):
-            found = "missing" if cells[row] is None else repr(cells[row])
-            faults.append(Fault(f"{path}:{numbers[row]}: {name}", f"{found} is no finite number", "give a number"))
-    signal = {name: factor * values[name] for name, (_, factor) in columns.items()}
+    table = TextTable(path)
+    otherwise = ', or give --alpha "9 deg"' if "alpha" in needed else ""
+    needed = [name for name in needed if name != "alpha" or alpha is None]
+    signal = table.numbers(UNITS, needed, FEWEST, otherwise=otherwise)
+    if alpha is not None:
+        if "alpha" in signal:
+            table.fault(table.head, "alpha", "is there and given, too", "remove --alpha, or the column")
+        signal["alpha"] = np.full(len(table.rows), alpha)
     if "angle" in signal:
         signal["angle"] = np.unwrap(signal["angle"])
     for name in ("time", "angle"):
         for row in 1 + np.flatnonzero(np.diff(signal.get(name, np.zeros(0))) <= 0):
-            faults.append(Fault(f"{path}:{numbers[row]}: {name}", "does not rise", "give samples in their order"))
-    if len(numbers) < FEWEST:
-        faults.append(Fault(str(path), f"has {len(numbers)} samples", f"give at least {FEWEST} lines below the header"))
-    if len(faults) > SHOWN:
-        others = Fault(str(path), f"has {len(faults) - SHOWN} more faults", "mend all lines in the same way")
-        faults = [*faults[:SHOWN], others]
-    raise_all(faults)
-    return signal
+            table.fault(table.rows[row][0], name, "does not rise", "give samples in their order")
+    table.check()
+    time = signal.get("time", np.zeros(0))
+    gaps = [
+        f"{path}:{table.rows[row + 1][0]}: gap of {time[row + 1] - time[row]:.6g} s after the time {time[row]:.6g} s"
+        for row in np.flatnonzero(durations(time) == 0)
+    ]
+    return Signal(signal, tuple(gaps))
+
+
+def durations(time: FloatArray) -> FloatArray:
+    """Times between samples, s, (n - 1,); zero in a gap, more than `GAP` times as long as the median one."""
+    steps = np.diff(time)
+    return np.where(steps > GAP * np.median(steps), 0.0, steps) if len(steps) else steps
 
 
 class Orders(NamedTuple):
@@ -136,6 +122,8 @@ class Orders(NamedTuple):
         Share of the variance in orders that are not kept; NaN for a constant.
     turns : int
         Revolutions evaluated.
+    gaps : tuple of str
+        Place and length of each gap of the file; the longest part between them is evaluated.
     """
 
     mean: float
@@ -145,6 +133,7 @@ class Orders(NamedTuple):
     unrepeated: float
     left_out: float
     turns: int
+    gaps: tuple[str, ...] = ()
 
 
 def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None) -> Orders:
@@ -227,14 +216,18 @@ def _ahead(speed: FloatArray) -> float:
 def orders_of(path: Path, key: str) -> Orders:
     """Orders of the ``"speed"`` or the ``"torque"`` of a measured signal.
 
-    The file has two of time, angle and speed, or for the torque of a shaft that turns evenly the angle alone.
+    The file has two of time, angle and speed, or for the torque of a shaft that turns evenly the angle alone. Of a
+    signal with gaps, the longest part without one is taken.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    signal = read(path, ["torque"] if key == "torque" else [])
+    signal, gaps = read(path, ["torque"] if key == "torque" else [])
+    if gaps:
+        parts = np.split(np.arange(len(signal["time"])), 1 + np.flatnonzero(durations(signal["time"]) == 0))
+        signal = {name: values[max(parts, key=len)] for name, values in signal.items()}
     time, angle, speed = (signal.get(name) for name in ("time", "angle", "speed"))
     if speed is not None and not speed.min() > 0:
         remedy = "give a part in which the shaft turns forwards"
@@ -248,7 +241,7 @@ def orders_of(path: Path, key: str) -> Orders:
     if time is None:
         time = angle if speed is None else _integral(angle, 1.0 / speed)
     try:
-        return orders(angle, time, signal.get(key))
+        return orders(angle, time, signal.get(key))._replace(gaps=gaps)
     except ValueError as error:
         raise input_error(path, str(error), "give a longer or denser signal") from error
 
@@ -296,11 +289,12 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
                 known[table["file"], key] = orders_of(path.parent / table["file"], key)
             orders_found = known[table["file"], key]
             notes.append(f"{dotted(path_of_key)}: {_note(table['file'], orders_found)}")
-        faults += [fault for fault in faults_of_key if fault not in faults]
+            notes += [f"{gap}: orders are of the longest part without a gap" for gap in orders_found.gaps]
+        faults += faults_of_key
         changes[path_of_key] = dict.fromkeys(table) | _written(key, orders_found)
     with gather(faults):
         text = rewriting.with_keys(text, changes, str(path)) if changes else text
-    return text, tuple(notes)
+    return text, tuple(dict.fromkeys(notes))
 
 
 def _files(data: Any) -> Iterator[tuple[KeyPath, Table]]:

@@ -54,6 +54,8 @@ class DutyCycle(NamedTuple):
         Visits that are not among them, since changes of the torque around them are the smallest.
     turns : float
         Revolutions at the points.
+    gaps : tuple of str
+        Place and length of each gap of the signal, which counts for no time.
     """
 
     alpha: FloatArray
@@ -66,6 +68,7 @@ class DutyCycle(NamedTuple):
     visits: NDArray[np.intp]
     left_out: int
     turns: float
+    gaps: tuple[str, ...] = ()
 
 
 def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: FloatArray, m: float) -> DutyCycle:
@@ -77,7 +80,7 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
     Parameters
     ----------
     time, torque, speed, alpha : ndarray, shape (n,)
-        Samples: s, rising; N m; rad/s; rad.
+        Samples: s, rising; N m; rad/s; rad. Gaps of the time count for nothing, see `signals.durations`.
     m : float
         Wöhler exponent.
 
@@ -86,7 +89,7 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
     ValueError
         When the shaft never turns, or turns without torque.
     """
-    steps = np.diff(time)
+    steps = signals.durations(time)
     lasting = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
     turning = np.abs(speed) > STANDING * np.abs(speed).max()
     revolutions = np.where(turning, lasting * np.abs(speed) / (2.0 * np.pi), 0.0)
@@ -180,19 +183,20 @@ def _fewer(visits: NDArray[np.intp], torques: FloatArray) -> NDArray[np.intp]:
     return np.array(chosen[:VISITS], np.intp)
 
 
-def read(path: Path, m: float) -> DutyCycle:
-    """Duty cycle of a measured signal, see `signals.read` and `duty_cycle`.
+def read(path: Path, m: float, alpha: float | None = None) -> DutyCycle:
+    """Duty cycle of a measured signal and, where it has none, a misalignment; see `signals.read` and `duty_cycle`.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    signal = signals.read(path, NEEDED)
+    signal, gaps = signals.read(path, NEEDED, alpha)
     try:
-        return duty_cycle(signal["time"], signal["torque"], signal["speed"], signal["alpha"], m)
+        cycle = duty_cycle(signal["time"], signal["torque"], signal["speed"], signal["alpha"], m)
     except ValueError as error:
         raise input_error(path, str(error), "give the signal of a loaded shaft") from error
+    return cycle._replace(gaps=gaps)
 
 
 def names(cycle: DutyCycle) -> list[str]:

@@ -205,7 +205,7 @@ def read(
     asked_alpha = validate(
         joints.Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha"
     ).alpha
-    if path.is_file() and path.suffix != ".toml":
+    if path.is_file() and path.suffix.lower() != ".toml":
         with ResultFile.open(path) as store:
             if row is not None and row not in store.rows:
                 holds = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
@@ -220,7 +220,7 @@ def read(
                 errors, title = store.errors(slice(slot, slot + 1)), f"{title}, row {row}"
     elif row is not None:
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
-    elif path.suffix == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
+    elif path.suffix.lower() == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
         case = study.load(path) if "sampling" in data else study.load_case(path)
         joint, title = case.joint, path.stem
         alphas = list(case.operation.alphas)

@@ -7,24 +7,20 @@ never evaluated. scipy.stats is imported for studies that have such an entry onl
 from __future__ import annotations
 
 import ast
-import csv
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
-from io import StringIO
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from tolstat.analysis.measured import LEAST_PARTS
-from tolstat.common import strict, units
-from tolstat.common.files import about_encoding, finite, read_input
+from tolstat.common import units
 from tolstat.common.late import stats
 from tolstat.common.strict import did_you_mean, refuse
+from tolstat.common.text_table import TextTable
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Value
@@ -177,7 +173,7 @@ RARE = 0.005
 
 
 class MeasuredEntry(SingleEntry):
-    """Measured parts of a CSV file with a header row, drawn with equal probability; or, with `law`, its sample.
+    """Measured parts of a text file with a header, drawn with equal probability; or, with `law`, its sample.
 
     With `law` mean and deviation of the sample are those of the parts, and the study knows that they are estimates.
     """
@@ -185,13 +181,13 @@ class MeasuredEntry(SingleEntry):
     scales = False
     distribution: Literal["measured"]
     file: str | None = Field(default=None, examples=["rattle.csv"])
-    """path of the CSV file, from the study's folder"""
+    """path of the text file, from the study's folder"""
     column: str | None = Field(default=None, examples=["speed_rpm"])
-    """name of the column in the header row"""
+    """name of the column in the header, without its unit"""
     values: list[float] | None = Field(default=None, examples=[[0.012, -0.004, 0.007]])
     """the measured values, in place of a file; needs `law`"""
     unit: str | None = Field(default=None, examples=["rpm"])
-    """unit of the values; needed unless the error is a pure number"""
+    """unit of the values; needed unless the file has it or the error is a pure number"""
     law: Literal["normal", "lognormal"] | None = Field(default=None, examples=["normal"])
     """law that the parts are a sample of, for shares far out; without it each joint has one of the measured values"""
 
@@ -206,10 +202,7 @@ class MeasuredEntry(SingleEntry):
             beyond = f"a value that {100 * RARE:g} % of the parts exceed lies beyond all of them with probability"
             found = f"a sample of {len(values)} has no tail: {beyond} {100 * (1.0 - RARE) ** len(values):.0f} %"
             raise refuse(found, 'add law = "normal" or "lognormal"')
-        factor = _factor(self.unit, site, "the values")
-        if self.law is None:
-            return tolerance.Measured.of(factor * value for value in values)
-        return _fitted(self.law, factor * np.array(values))
+        return tolerance.Measured.of(values.tolist()) if self.law is None else _fitted(self.law, values)
 
     def number(self, site: Site) -> str:
         """See `SingleEntry.number`."""
@@ -218,7 +211,8 @@ class MeasuredEntry(SingleEntry):
     def band(self, site: Site) -> None:
         """See `SingleEntry.band`."""
 
-    def _values(self, site: Site) -> Sequence[float]:
+    def _values(self, site: Site) -> Array:
+        """The values, SI."""
         if (self.values is None) == (self.file is None):
             raise refuse("needs either file and column, or values", "give one of the two")
         if self.values is not None:
@@ -226,10 +220,18 @@ class MeasuredEntry(SingleEntry):
                 raise refuse("column without file", "remove it")
             if not all(map(math.isfinite, self.values)):
                 raise refuse("a value is not a finite number", "give finite numbers")
-            return self.values
+            return _factor(self.unit, site, "the values") * np.array(self.values)
         if self.file is None or self.column is None:
             raise refuse("file without column", "add the name of the column")
-        return _read(site.folder / self.file, self.column)
+        given = {} if self.unit is None else {self.column: self.unit}
+        for unit in given.values():
+            _factor(unit, site, "the values")  # refused here, where it stands
+        table = TextTable(site.folder / self.file)
+        values = table.numbers({self.column: site.unit}, [self.column], 2, given, ", or name another column")
+        table.check()
+        if (unit := table.units[self.column]) and unit != (self.unit or unit):
+            raise refuse(f"unit is {self.unit!r}, but {table.path} has {unit!r}", "remove one of them")
+        return values[self.column]
 
 
 def _fitted(law: str, values: tolerance.Array) -> tolerance.Normal | tolerance.LogNormal:
@@ -244,27 +246,3 @@ def _fitted(law: str, values: tolerance.Array) -> tolerance.Normal | tolerance.L
     if not normal.sigma > 0.0:
         raise refuse("all measured values are equal", "give the values as they were measured")
     return normal if law == "normal" else tolerance.LogNormal(0.0, normal)
-
-
-def _read(path: Path, column: str) -> list[float]:
-    try:
-        lines = StringIO(read_input(path), newline="")
-        rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
-        cells = [row.get(column) for row in rows]
-        columns = rows.fieldnames or ()
-    except UnicodeDecodeError as error:
-        found, remedy = about_encoding(error)
-        raise refuse(f"{path} {found}", remedy) from error
-    except (OSError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        remedy = "give a CSV file; its path starts from the study's folder"
-        raise refuse(f"{path} cannot be read: {reason}", remedy) from error
-    if column not in columns:
-        raise refuse(f"{path} has no column {column!r}", strict.did_you_mean(column, list(columns)))
-    values = list(map(finite, cells))
-    if any(map(math.isnan, values)):
-        row = list(map(math.isnan, values)).index(True)
-        raise refuse(f"{path}: row {row + 1} of {column!r} is {cells[row]!r}", "give a finite number in each row")
-    if len(values) < 2:
-        raise refuse(f"{path} has {len(values)} values in {column!r}", "give at least two measured parts")
-    return values

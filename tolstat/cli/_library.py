@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
     from tolstat.joint import sections
-    from tolstat.questions import joints
+    from tolstat.questions import accuracy, joints
     from tolstat.questions.drawings import answer as drawings
     from tolstat.questions.exceedance import answer as exceedance
     from tolstat.questions.fatigue import loads as fatigue
@@ -43,8 +43,8 @@ else:
     names = ("common.columns", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
     columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
-    names = ("joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
-    joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
+    names = ("accuracy", "joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
+    accuracy, joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
     names = ("report.answer", "report.page", "solver.compilation")
     reports, page, compilation = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")

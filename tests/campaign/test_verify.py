@@ -19,7 +19,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
-from tolstat.questions import joints as question
+from tolstat.questions import accuracy as question
 from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification

@@ -24,7 +24,7 @@ from tolstat.display.answer import Asked
 from tolstat.display.blocks import Section, Sentence
 from tolstat.display.html import bound, grouped
 from tolstat.display.table import Table
-from tolstat.questions import joints
+from tolstat.questions import accuracy, joints
 from tolstat.questions.exceedance import rows
 from tolstat.report import headline, page
 from tolstat.store import Reader, ResultFile, revolutions
@@ -255,8 +255,8 @@ def test_a_number_stays_with_its_unit_and_an_interval_on_one_line():
 
 
 def test_a_small_numerical_error_is_not_given_in_digits():
-    assert joints.in_percent(9.5e-7) == "< 0.001 %"
-    assert joints.in_percent(1.08e-3) == "0.108 %"
+    assert accuracy.in_percent(9.5e-7) == "< 0.001 %"
+    assert accuracy.in_percent(1.08e-3) == "0.108 %"
 
 
 @pytest.mark.slow

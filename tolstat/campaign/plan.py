@@ -17,6 +17,7 @@ from tolstat.analysis import binomial
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import verify
 from tolstat.campaign.block import spread
+from tolstat.campaign.chosen import few
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
@@ -312,14 +313,15 @@ def _assembly(study: Study, iid: bool) -> Assembly:
 
 
 def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], options: list[Options]) -> float:
-    """Time of the check at the end of the run, from one on as many settled joints of the pilot, s."""
-    settled = np.flatnonzero(results["status"] == Status.OK)[: verify.few(study.rows)]
+    """Time of the check at the end of the run, from one on settled joints of the pilot, s."""
+    number = min(2 * few(study.rows), study.rows)
+    settled = np.flatnonzero(results["status"] == Status.OK)[:number]
     if not settled.size:
         return 0.0
     begin = time.process_time()
     own = [options[i] for i in settled.tolist()]
     verify.run_checks(params[settled], own, study.mechanism, verify.QUICK_CHECKS, simulate_rows)
-    return time.process_time() - begin
+    return (time.process_time() - begin) * number / settled.size
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:

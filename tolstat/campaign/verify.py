@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
-from tolstat.campaign import pool
+from tolstat.campaign import chosen, pool
 from tolstat.campaign.blocks import simulate_beside
+from tolstat.campaign.chosen import choose, nearest, settled
 from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.what_if import check_code
@@ -24,26 +25,25 @@ from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
-from tolstat.common.loads import Limit, load_of, split
+from tolstat.common.loads import load_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.solver.reference import reference_rows
-from tolstat.store import Reader, View, Writer, verification
+from tolstat.store import Reader, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Check, Verification
 from tolstat.study import Study, load
 
-QUICK_CHECKS = ("half_step", "newton", "settling")
-"""Checks at the end of every run; they need no code beyond that of the run."""
-ALL_CHECKS = (*QUICK_CHECKS, "method", "reference")
+QUICK_CHECKS = ("finer",)
+"""The check at the end of every run; it needs no code beyond that of the run."""
+ALL_CHECKS = ("half_step", "newton", "settling", "method", "reference")
+"""Checks of `tolstat verify`, which tell what an error comes from."""
 MIN_STEPS = 180
 """Minimum steps per revolution of the dynamic simulation that checks one of lower fidelity."""
 EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
-JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
-"""At the end of a run one joint in 400 is checked, at least one and at most 16: some 2 % of the run's time."""
 
 Simulate = Callable[..., Simulation]
 Progress = Callable[[Counts], None]
@@ -53,6 +53,11 @@ def _other_start(options: Options) -> dict[str, Any]:
     start = Start.RAMP if options.start == Start.STATIC else Start.STATIC
     finer = {"settle_tol": 0.01 * options.settle_tol, "newton_tol": 0.1 * options.newton_tol}
     return {**finer, "start": int(start)}
+
+
+def _finer(options: Options) -> dict[str, Any]:
+    tolerances = {"newton_tol": 0.01 * options.newton_tol, "settle_tol": 0.01 * options.settle_tol}
+    return {"steps_per_rev": 2 * options.steps_per_rev, **tolerances}
 
 
 def _other_method(options: Options) -> dict[str, Any]:
@@ -67,6 +72,7 @@ def _dynamic(options: Options) -> dict[str, Any]:
 
 CHECKS: dict[str, tuple[str, Callable[[Options], dict[str, Any]]]] = {
     "half_step": ("twice as many steps a revolution", lambda options: {"steps_per_rev": 2 * options.steps_per_rev}),
+    "finer": ("twice as many steps, 1/100 of solver.newton_tol and solver.settle_tol", _finer),
     "newton": ("a hundredth of solver.newton_tol", lambda options: {"newton_tol": 0.01 * options.newton_tol}),
     "settling": ("the other solver.start, 1/100 of solver.settle_tol, 1/10 of solver.newton_tol", _other_start),
     "method": ("another solver.method", _other_method),
@@ -167,23 +173,12 @@ Make = Callable[[NDArray[np.void], Sequence[Options], Mechanism], dict[str, Chec
 """Function that simulates joints again, see `run_checks`."""
 
 
-def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.intp]:
-    """Choose `joints` of the `rows` at random, ascending; all if there are fewer, or if `joints` is None."""
-    if joints is None:
-        return rows
-    rng = np.random.default_rng([seed, 4])  # 4: another random stream than that of the errors
-    return np.sort(rng.choice(rows, min(joints, len(rows)), replace=False))
-
-
 def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> Verification | None:
     """Check so many settled joints, all with None, the nominal one included; None if no joint is settled.
 
     `make` makes the checks from parameters and solver options of joints; `seed` is that of the random choice.
     """
-    settled = np.flatnonzero(store.status() == Status.OK)
-    if joints is not None and len(settled) > 1:
-        settled = settled[settled >= store.first_sample]  # the nominal joint is not in the statistics either
-    slots = choose(settled, joints, seed)
+    slots = np.flatnonzero(store.status() == Status.OK) if joints is None else choose(settled(store), joints, seed)
     return check_slots(store, slots, seed, make) if slots.size else None
 
 
@@ -196,23 +191,29 @@ def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -
     return Verification(seed, store.row(slots), pick(store.results, slots), checks)
 
 
-def few(rows: int) -> int:
-    """Number of joints that are checked at the end of a campaign of `rows` joints."""
-    return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
-
-
 def check_few(store: Writer) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
     Does nothing if the file is a slice, and leaves checks that it has as they are.
     """
-    seed, verifications = int(store.sampling["seed"]), []
+    parts = list[tuple[Writer, str, Verification]]()
     for at_point in store.each() if store.whole else ():
         if at_point.complete and verification.read(at_point) is None:
-            verified = check_campaign(at_point, few(at_point.n), seed, partial(run_checks, names=QUICK_CHECKS))
-            verifications += [(at_point, verified)] if verified else []
-    if verifications:
-        verification.write(verifications)
+            parts += [(at_point, name, part) for name, part in _check_few(at_point).items()]
+    if parts:
+        verification.write(parts)
+
+
+def _check_few(store: Reader) -> dict[str, Verification]:
+    """Checks of the joints of `chosen.quick`, simulated in lanes together, by name of the group."""
+    at_random, near = chosen.quick(store)
+    slots = np.union1d(at_random, near)
+    if not slots.size:
+        return {}
+    make = partial(run_checks, names=QUICK_CHECKS)
+    checked = check_slots(store, slots, int(store.sampling["seed"]), make)
+    groups = {verification.VERIFY: at_random, verification.NEAR: near}
+    return {name: checked.only(np.isin(slots, of_group)) for name, of_group in groups.items() if of_group.size}
 
 
 def check(
@@ -273,21 +274,8 @@ def check_file(path: Path, joints: int | None, seed: int | None = None, make: Ma
         compilation.announce()
         for at_point in store.each():
             if verified := check_campaign(at_point, joints, seed, make):
-                verification.write([(at_point, verified)])
+                verification.write([(at_point, verification.VERIFY, verified)])
         return verification.together(verification.read_each(store.each(), verification.VERIFY))
-
-
-def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
-    """File slots of the settled joints whose loads are nearest to a limit, ascending: so many for each load of it."""
-    view, nearest_samples = View(store), set[int]()
-    for name, level in zip(limit.loads, limit.levels, strict=True):
-        plain, points = split(name)
-        if points and store.point not in points.split("+"):
-            continue
-        distance = np.where(view.status == Status.OK, np.abs(view.simulated(plain) - level), np.inf)
-        order = np.argsort(distance, kind="stable")[:joints]
-        nearest_samples |= set(order[np.isfinite(distance[order])].tolist())
-    return view.slots(sorted(nearest_samples))
 
 
 def check_near(
@@ -329,29 +317,27 @@ def check_near(
             found = f"the file does not keep {', '.join(lacking)}"
             raise input_error("--near", found, "give loads that it keeps, see tolstat status")
         check_code(store)
-        chosen = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
-        fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
+        slots_of = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
+        fewest = min((slots.size for _, slots in slots_of if slots.size), default=0)
         if fewest < LEAST_NEAR:
             found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
             raise store_error(path, found, f"add joints: tolstat extend {path}")
         compilation.announce()
-        for at_point, slots in chosen:
+        for at_point, slots in slots_of:
             before = verification.read(at_point, verification.NEAR)
             new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
             if new.size:
                 make = partial(run_checks, names=QUICK_CHECKS, workers=workers, progress=progress)
                 checked = check_slots(at_point, new, 0, make)
                 merged = checked if before is None else _merged(before, checked)
-                verification.write([(at_point, merged)], verification.NEAR)
+                verification.write([(at_point, verification.NEAR, merged)])
         return verification.together(verification.read_each(store.each(), verification.NEAR))
 
 
 def _merged(*both: Verification) -> Verification:
     """Joints of both, ascending."""
     merged = verification.together(both)
-    order = np.argsort(merged.rows)
-    checks = {name: check._replace(results=check.results[order]) for name, check in merged.checks.items()}
-    return merged._replace(rows=merged.rows[order], base=merged.base[order], checks=checks)
+    return merged.only(np.argsort(merged.rows))
 
 
 def check_study(

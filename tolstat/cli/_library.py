@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
     from tolstat.joint import sections
-    from tolstat.questions import joints
+    from tolstat.questions import accuracy, joints
     from tolstat.questions.drawings import answer as drawings
     from tolstat.questions.exceedance import answer as exceedance
     from tolstat.questions.fatigue import loads as fatigue
@@ -44,8 +44,8 @@ else:
     names = ("columns", "loads", "strict", "tables", "text_table", "units")
     columns, load_units, strict, tables, text_tables, units = (Late(f"tolstat.common.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
-    names = ("joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
-    joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
+    names = ("accuracy", "joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
+    accuracy, joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
     names = ("report.answer", "report.page", "solver.compilation", "joint.sections")
     reports, page, compilation, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")

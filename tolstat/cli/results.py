@@ -171,25 +171,28 @@ def verify(
         else:
             verification = library.checks.check_near(what, near, joints or library.numerical.LEAST_NEAR, count, shown)
     units = dict.fromkeys(("median", "usual", "worst"), "1")
-    mechanism = _mechanism_of(what)
-    rows, by_load = (library.joints.error_rows(verification, mechanism, by_kind) for by_kind in (True, False))
+    mechanism, method = _sampled(what)
+    is_sample = near is None and method in library.columns.DRAWN
+    rows, by_load = (library.accuracy.error_rows(verification, mechanism, by_kind) for by_kind in (True, False))
     parts: list[library.answers.Part] = [
-        library.answers.Table("kinds", "By kind of load", library.joints.ERRORS, rows, units),
+        library.answers.Table("kinds", "By kind of load", library.accuracy.ERRORS, rows, units),
         library.answers.Table("loads", "By load", (), by_load, units),
-        library.answers.Sentence(library.joints.error_note(verification, mechanism)),
+        library.answers.Sentence(library.accuracy.error_note(verification, mechanism, (), is_sample)),
     ]
     facts = {"rows": verification.rows, "seed": verification.seed}
     facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
     deliver(library.answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
     if out is not None:
-        write_frame(pd.DataFrame(library.joints.joint_rows(verification, mechanism)), out)
+        write_frame(pd.DataFrame(library.accuracy.joint_rows(verification, mechanism)), out)
 
 
-def _mechanism_of(what: Path) -> Mechanism:
+def _sampled(what: Path) -> tuple[Mechanism, str]:
+    """What the joints of a study or result file are, and by which method they are sampled."""
     if what.suffix.lower() == ".toml":
-        return library.studies.load(what).mechanism
+        study = library.studies.load(what)
+        return study.mechanism, study.sampling.method
     with library.stores.ResultFile.open(what) as store:
-        return store.mechanism
+        return store.mechanism, str(store.sampling["method"])
 
 
 def export(

@@ -105,7 +105,7 @@ def run(
     until : str, optional
         Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".
     verify : bool
-        Check the numerical error on one joint in 400 (1 to 16) at the end.
+        Check the numerical error at the end: on one joint in 100 (29 to 299), and on as many near the limits.
     """
     retried = [text for text in settings or () if text.startswith("solver.")]
     changes = [text for text in settings or () if text not in retried]

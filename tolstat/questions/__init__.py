@@ -96,7 +96,7 @@ QUESTIONS = (
     Question("drawings", "", "Draw the joint, its errors and its worst rows.", "folded", "drawings.answer"),
     Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
-    Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", "joints", True),
+    Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", counted=True),
     Question("change", "Decide", "Simulate a change of the study on the same joints.", at_once=True, study=True),
     Question("allocate", "Decide", "Find the cheapest tolerances that meet the targets.", at_once=True, study=True),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),

@@ -16,7 +16,7 @@ from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
-from tolstat.questions import capability, joints, shares
+from tolstat.questions import accuracy, capability, shares
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import cases, sweep
@@ -123,7 +123,7 @@ def _notes(view: View) -> Iterator[Part]:
     if view.method != "sweep":
         yield Sentence(exceedance.note(view))
     if view.verification:
-        yield Sentence(joints.error_note(view.verification, view.mechanism, view.limits))
+        yield Sentence(accuracy.error_of_view(view, view.verification))
 
 
 def _run(view: View) -> Iterator[Part]:

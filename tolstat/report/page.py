@@ -23,7 +23,7 @@ from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.model import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
-from tolstat.questions import QUESTIONS, joints, shares
+from tolstat.questions import QUESTIONS, accuracy, shares
 from tolstat.questions.assumptions import answer, sentences, variations
 from tolstat.questions.causes import lines, revolution
 from tolstat.questions.drawings.answer import place_of
@@ -335,6 +335,6 @@ def _basis(view: View) -> list[Verdict]:
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
-        label = f"numerical error of the largest loads ({joints.called_for_people(kind, view.mechanism)})"
-        cards.append(Verdict("", joints.in_percent(usual[kind]), label, (joints.basis(view.verification),)))
+        label = f"numerical error of the largest loads ({accuracy.called_for_people(kind, view.mechanism)})"
+        cards.append(Verdict("", accuracy.in_percent(usual[kind]), label, (accuracy.basis(view.verification),)))
     return cards

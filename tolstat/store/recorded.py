@@ -19,7 +19,7 @@ from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
-from tolstat.store.hdf5 import store_error
+from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, points, subset_of
 from tolstat.study.design import KEYS
@@ -123,11 +123,13 @@ def note_on_mounting(store: Reader) -> str:
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
-    params = np.empty(len(rows), tables(store.mechanism).PARAM)
-    for i, row in enumerate(rows.tolist()):
-        errors = store.errors(slice(row, row + 1))
-        params[i : i + 1] = perturb(joint_of(store, row), operation_of(store, row), errors)
+    """Parameters of the joints in file slots `rows`, ascending, (m,) table PARAM."""
+    params, errors = np.empty(len(rows), tables(store.mechanism).PARAM), pick(store.errors, rows)
+    number = store.design()["variant"][rows] if store.variants else np.zeros(len(rows), np.intp)
+    for variant in np.unique(number):
+        here = number == variant
+        first = int(rows[here][0])
+        params[here] = perturb(joint_of(store, first), operation_of(store, first), errors[here])
     return params
 
 

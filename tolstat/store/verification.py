@@ -53,13 +53,18 @@ class Verification(NamedTuple):
     base : ndarray of RESULT, shape (m,)
         Their results in the campaign.
     checks : dict of str to Check
-        By name: ``half_step``, ``newton``, ``settling``, ``method``, ``reference``, ``fidelity``.
+        By name: ``finer``, or ``half_step``, ``newton``, ``settling``, ``method``, ``reference``; and ``fidelity``.
     """
 
     seed: int
     rows: NDArray[np.intp]
     base: NDArray[np.void]
     checks: dict[str, Check]
+
+    def only(self, here: NDArray[Any]) -> Verification:
+        """Some of the joints: by a mask, (m,), or by indices in their order."""
+        checks = {name: check._replace(results=check.results[here]) for name, check in self.checks.items()}
+        return self._replace(rows=self.rows[here], base=self.base[here], checks=checks)
 
 
 def read(store: Reader, name: str = VERIFY) -> Verification | None:
@@ -114,8 +119,8 @@ def together(parts: Sequence[Verification]) -> Verification:
     return Verification(first.seed, rows, base, checks)
 
 
-def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
-    """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
+def write(parts: Sequence[tuple[Writer, str, Verification]]) -> None:
+    """Write groups of verifications at operating points of one file, replacing earlier ones; the file is replaced once.
 
     Raises
     ------
@@ -124,7 +129,7 @@ def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERI
     """
 
     def change(file: h5py.File) -> None:
-        for store, verification in verifications:
+        for store, name, verification in parts:
             holder = file[layout.place_of(store.point or "") or "/"]
             if name in holder:
                 del holder[name]
@@ -140,4 +145,4 @@ def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERI
                 put_attributes(group[check_name], {"description": check.description, "options": options})
             put_attributes(group, {CHECKSUM: _checksum(group)})
 
-    verifications[0][0].replace(change)
+    parts[0][0].replace(change)

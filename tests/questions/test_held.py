@@ -11,6 +11,7 @@ import tolstat
 from tests.support import fakes
 from tolstat import study
 from tolstat.campaign import run as campaign
+from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status, without_results
 from tolstat.questions import heat
 from tolstat.solver import stationary
@@ -50,6 +51,7 @@ seed = 1
 [limits]
 "thrust*.F" = "1 kN"
 "loss" = "30 W"
+"loss at fast" = "47 W"
 """
 
 
@@ -84,6 +86,16 @@ def test_the_study_of_the_file_has_its_parts(path: Path) -> None:
         assert view.study.mechanism == view.mechanism
         assert {"thrust.end_play", "friction.mu"} <= view.study.tolerances.keys()
         assert view.load("thrust3.F").limit == 1000.0
+
+
+def test_a_limit_at_one_point_is_compared(path: Path) -> None:
+    with ResultFile.open(path) as store:
+        rows = tolstat.compare(store.view(), store.view()).frame("shares").set_index("load")
+        with pytest.raises(InputError, match="'los at fast' is not a load that both files keep\n.*did you mean 'loss'"):
+            tolstat.compare(store.view(), store.view(), ["los at fast"])
+        mu = 0.05 + store.errors()["friction.mu"][1:]
+    share = np.mean(0.1 * mu * 60 * 1500 * np.pi / 30 > 47.0)
+    assert rows.loc["loss at fast", ["level", "a", "b"]].tolist() == [47.0, share, share]
 
 
 def test_heat_is_the_loss_and_what_it_leaves_of_the_power(path: Path) -> None:

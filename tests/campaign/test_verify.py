@@ -154,6 +154,18 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
     assert accuracy.spread(found[2])[0] == 0
 
 
+def test_errors_of_a_vanishing_load_are_relative_to_other_joints():
+    """At a point without misalignment pins do not slide: what a step changes of the loss there is no error of it."""
+    base = synthetic.results(3)
+    base["psi_max"][:] = 2e-3, 1e-16, 2e-3
+    other = base.copy()
+    other["psi_max"][:] += 2e-13
+    other["psi_max"][2] = 9.0
+    base["status"][2] = Status.NOT_SETTLED
+    number = accuracy.observables(CARDAN).index("psi")
+    assert accuracy.differences(base, other, CARDAN)[:2, number] == pytest.approx([-1e-10, -1e-8], rel=1e-3)
+
+
 def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
     path = tmp_path / "a.h5"
     fakes.run(fakes.Study(n=900), path, check=True)

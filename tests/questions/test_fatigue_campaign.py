@@ -17,7 +17,7 @@ from tests.support.environment import ROOT
 from tests.support.of_cardan import BUSHING_LOADS, COMPONENTS
 from tests.support.reports import call
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
-from tolstat.common.cardan import CARDAN
+from tolstat.common.cardan import CARDAN, MECHANISMS, named
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import SIMULATED
@@ -323,7 +323,8 @@ def test_channels_are_selected_by_patterns():
     )  # fmt: skip
     with pytest.raises(InputError) as error:
         channels(
-            ["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "cross1.F at 3 mm", "input.drive at worst"],
+            ["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "cross1.F at 3 mm", "input.drive at worst"]
+            + ["fork9.F_e"],
             CARDAN,
         )
     found = {fault.place: (fault.found, fault.remedy) for fault in error.value.faults}
@@ -331,8 +332,12 @@ def test_channels_are_selected_by_patterns():
     directions = 'fork1.F_e, fork1.F_t, fork1.F_z, or "fork1.F at 30 deg", "fork1.F at worst"'
     assert found["--by: fork1.F"] == (f"fork1.F {unsigned}", f"write {directions}")
     assert found["--by: output.axial"] == (f"output.axial {unsigned}", "write output.f_z")
-    assert found["--by: pin1.contact"][0] == found["--by: input.drive at worst"][0] == "selects nothing"
-    assert len(found) == 5
+    not_counted = "selects loads of which cycles are not counted"
+    assert found["--by: pin1.contact"][0] == found["--by: input.drive at worst"][0] == not_counted
+    assert found["--by: fork9.F_e"][0] == "selects nothing"
+    with pytest.raises(InputError, match=f"--by: input.bearing_a: {not_counted}"):
+        channels(["input.bearing_a"], MECHANISMS[named(CARDAN, ["input_bearings"])])
+    assert len(found) == 6
 
 
 def test_every_fault_of_the_section_is_told():

@@ -11,7 +11,9 @@ import tolstat
 from tests.support import fakes
 from tolstat import study
 from tolstat.campaign import run as campaign
+from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status, without_results
+from tolstat.questions import heat
 from tolstat.solver import stationary
 from tolstat.store import ResultFile
 
@@ -49,15 +51,16 @@ seed = 1
 [limits]
 "thrust*.F" = "1 kN"
 "loss" = "30 W"
+"loss at fast" = "47 W"
 """
 
 
 def simulate(params, options, mechanism, **kept) -> Simulation:
-    """Loss in proportion to friction, torque and speed; loads of bearings to torque."""
+    """Loss in proportion to friction, torque and speed, 5 W at least; loads of bearings to torque."""
     results = without_results(len(params), Status.OK, mechanism)
     for name in (name for name in results.dtype.names if name.endswith(("_max", "_mean", "_range"))):
         results[name] = 100.0
-    of_pin = 0.1 * params["mu"] * np.abs(params["torque"] * params["omega"]) / 4
+    of_pin = 0.1 * params["mu"] * np.maximum(np.abs(params["torque"] * params["omega"]), 1e3) / 4
     results["loss_max"][:, :4], results["loss_max"][:, 4] = of_pin[:, None], 4 * of_pin
     results["bearing_a_balls_max"] = results["bearing_a_rollers_max"] = 10.0 * params["torque"][:, None]
     results["settled"] = 1
@@ -85,6 +88,16 @@ def test_the_study_of_the_file_has_its_parts(path: Path) -> None:
         assert view.load("thrust3.F").limit == 1000.0
 
 
+def test_a_limit_at_one_point_is_compared(path: Path) -> None:
+    with ResultFile.open(path) as store:
+        rows = tolstat.compare(store.view(), store.view()).frame("shares").set_index("load")
+        with pytest.raises(InputError, match="'los at fast' is not a load that both files keep\n.*did you mean 'loss'"):
+            tolstat.compare(store.view(), store.view(), ["los at fast"])
+        mu = 0.05 + store.errors()["friction.mu"][1:]
+    share = np.mean(0.1 * mu * 60 * 1500 * np.pi / 30 > 47.0)
+    assert rows.loc["loss at fast", ["level", "a", "b"]].tolist() == [47.0, share, share]
+
+
 def test_heat_is_the_loss_and_what_it_leaves_of_the_power(path: Path) -> None:
     """Of the stand-in a share 0.1 mu of torque times speed, so that the efficiency is 1/(1 + 0.1 mu)."""
     with ResultFile.open(path) as store:
@@ -99,6 +112,28 @@ def test_heat_is_the_loss_and_what_it_leaves_of_the_power(path: Path) -> None:
         assert efficiency["nominal"] == pytest.approx(1 / 1.005)
         assert efficiency["median"] == pytest.approx(np.median(1 / (1 + 0.1 * mu)), rel=1e-9)
         assert efficiency["bound"] <= efficiency["median"]
+
+
+@pytest.mark.parametrize(
+    ("torque", "speed", "expected"),
+    [("-100", "500", 0.995), ("100", "-500", 0.995), ("-0.01", "500", 0.0), ("0", "500", np.nan)],
+)
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_an_output_shaft_that_drives_loses_the_loss_of_its_power(
+    tmp_path: Path, torque: str, speed: str, expected: float
+) -> None:
+    """A loss of 5 W leaves nothing of 0.5 W; without torque there is no efficiency."""
+    text = TEXT.replace('torque = "100', f'torque = "{torque}').replace('speed = "500', f'speed = "{speed}')
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        fakes.replace_functions(patch, **fakes.SOLVER | {"simulate_rows": simulate})
+        campaign.run(study.load(tmp_path / "a.toml"), tmp_path / "a.h5", 1, check=False)
+    with ResultFile.open(tmp_path / "a.h5") as store:
+        row = tolstat.heat(store.view()).frame("heat").set_index(["point", "of"]).loc["slow", "efficiency"]
+    assert row["nominal"] == pytest.approx(expected, nan_ok=True)
+    assert row["median"] == pytest.approx(expected, abs=3e-3, nan_ok=True)
+    cells = [column.cell(row) for column in heat.COLUMNS[2:]]
+    assert cells == ["-"] * 3 if np.isnan(expected) else "%" in cells[0]
 
 
 def test_equivalent_loads_are_means_over_the_revolutions_of_the_duty_cycle(path: Path) -> None:

@@ -29,6 +29,8 @@ seed = 1
 """
 UNIFORM = '= { plus_minus = "1e-2 mm", distribution = "uniform" }'
 
+BELOW = '= {{ {}, distribution = "normal" }}'
+
 
 def load(folder: Path, parts: str = "", tolerances: str = "", more: str = ""):
     path = folder / "a.toml"
@@ -54,6 +56,34 @@ REFUSED = {
         "[joint.thrust]",
     ),
     "negative friction": ({"parts": "friction.mu = -0.1"}, "joint.friction.mu: -0.1 must not be negative", "zero"),
+    "friction above 1": ({"parts": "friction.mu = 3"}, "joint.friction.mu: 3 is above 1", "such as 0.05"),
+    "friction that scatters below zero": (
+        {"parts": "friction.mu = 0.004", "tolerances": f'"friction.mu" {BELOW.format("plus_minus = 0.02")}'},
+        ":11: tolerances.friction.mu: takes friction.mu = 0.004 of the joint down to -0.016, below zero",
+        "no deviation below -0.004",
+    ),
+    "friction without a band that scatters below zero": (
+        {"parts": "friction.mu = 0.004", "tolerances": f'"friction.m*" {BELOW.format("std = 0.002")}'},
+        "tolerances.friction.mu: takes friction.mu = 0.004 of the joint down to -0.00218, below zero",
+        "no deviation below -0.004",
+    ),
+    "friction below zero by a given error": (
+        {"parts": "friction.mu = 0.004", "more": '[errors]\n"friction.mu" = -0.01'},
+        ":16: errors.friction.mu: takes friction.mu = 0.004 of the joint down to -0.006, below zero",
+        "no deviation below -0.004",
+    ),
+    "faces far away": (
+        {"parts": 'thrust = { end_play = "-50 mm", k = "1e8 N/m" }'},
+        "joint.thrust: end_play = -50 mm is more than 0.2 cross.R = ",
+        "check its unit; give -",
+    ),
+    "grade in m/s": (
+        {"parts": 'shaft.unbalance = { grade = "16 m/s", mass = "5 kg", speed = "3000 rpm" }'},
+        "grade: 16 m/s is above G 4000",
+        '"16 mm/s"',
+    ),
+    "grade without unit": ({"parts": "shaft.unbalance.grade = 16"}, "grade: 16 has no unit", 'write "16 mm/s"'),
+    "grade with its letter": ({"parts": 'shaft.unbalance.grade = "G16"'}, "'G16' is not a number", 'write "16 mm/s"'),
     "bearings in the wrong order": (
         {"parts": 'shaft.input.bearings = ["240 mm", "80 mm"]'},
         "shaft.input.bearings: 240 mm, 80 mm are not two places in order",
@@ -80,6 +110,13 @@ def test_refusals_name_place_and_remedy(tmp_path: Path, name: str) -> None:
         load(tmp_path, **sections)
     assert found in str(raised.value)
     assert remedy in str(raised.value)
+
+
+def test_friction_may_scatter_down_to_zero(tmp_path: Path) -> None:
+    tolerance = '"friction.mu" = { plus_minus = 0.004, distribution = "uniform" }'
+    more = '[errors]\n"thrust.end_play" = "0.1 mm"'
+    parts = 'friction.mu = 0.004\nthrust = { end_play = "-0.5 mm", k = "1e8 N/m" }'
+    assert "friction.mu" in load(tmp_path, parts, tolerance, more).tolerances
 
 
 def test_all_joints_of_a_study_have_the_same_parts(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 Errors are relative to the largest load of the kind in the joint, or of the kind that measures it (`Kind.measure`): a
 force to the largest ``|F|`` of its bushings, a torque to the largest ``|T|``, a contact force to the largest one of all
-pins, Psi to itself. Loads that a campaign does not store are NaN in all of its joints and are left out of
-these maxima; without any load of its measure, a load is relative to the largest of its own kind.
+pins, Psi to itself; at least to `LEAST_SIZE` of the largest one of all joints and operating points that are compared: a
+joint without misalignment has no loss that an error could be relative to. Loads that a campaign does not store are NaN
+in all of its joints and are left out of these maxima; without any load of its measure, a load is relative to the
+largest of its own kind.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ HALF_STEP_SHARE = 4 / 3
 """Richardson extrapolation: half the step changes the result of a method of order 2 by 3/4 of its error."""
 USUAL = 0.95
 """Quantile over the joints at which a report gives the error."""
+LEAST_SIZE = 0.01
+"""Share of the largest load of a kind among joints that errors are relative to at least."""
 LEAST_NEAR = 50
 """Minimum number of verified joints near a limit for which the numerical error there is known."""
 
@@ -79,7 +83,7 @@ def _largest(values: FloatArray) -> FloatArray:
 
 
 def differences(base: NDArray[np.void], other: NDArray[np.void], mechanism: Mechanism) -> FloatArray:
-    """Difference of `base` and `other`, relative to the largest load of the measure in `other`.
+    """Difference of `base` and `other`, relative to the largest load of the measure in `other`, see `LEAST_SIZE`.
 
     Parameters
     ----------
@@ -94,7 +98,9 @@ def differences(base: NDArray[np.void], other: NDArray[np.void], mechanism: Mech
         `base` less `other`, in the order of `observables`; NaN where a joint is not settled in `base` or has no
         results in `other`.
     """
-    sizes = np.column_stack([size(other, kind) for kind in kinds(mechanism).values()])[:, _number_of_kind(mechanism)]
+    of_base, sizes = (np.column_stack([size(t, kind) for kind in kinds(mechanism).values()]) for t in (base, other))
+    largest = np.fmax.reduce(of_base[base["status"] == Status.OK], axis=0, initial=0.0)
+    sizes = np.maximum(sizes, LEAST_SIZE * largest)[:, _number_of_kind(mechanism)]
     changed = loads(base, mechanism) - loads(other, mechanism)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.where(sizes == 0, 0.0, changed / sizes)

@@ -38,7 +38,7 @@ _USUAL: dict[str, tuple[str, dict[str, float]]] = {
     "N/m": ("1.2e6 N/mm", {"N/m": 1.0, "N/mm": 1e3}),
     "N/m^2": ("7.5e7 N/mm^2", {"N/m^2": 1.0, "N/mm^2": 1e6}),
     "N*s/m": ("200 N*s/m", {"N*s/m": 1.0}),
-    "m/s": ("0.01 m/s", {"m/s": 1.0, "mm/s": 1e-3}),
+    "m/s": ("16 mm/s", {"m/s": 1.0, "mm/s": 1e-3}),
     "W": ("30 W", {"W": 1.0, "kW": 1e3}),
     "Pa": ("210 GPa", {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6}),
     "1/m^2": ("2.5 MPa/kN", {"MPa/kN": 1e3}),

@@ -15,7 +15,7 @@ from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
 from tolstat.common.errors import Fault
 from tolstat.common.loads import loads_of
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import tables
+from tolstat.common.tables import MAX_SHIFT, tables
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
@@ -131,6 +131,20 @@ class Joint(Strict):
     def _holds_the_pins(cls, value: Cross, info: ValidationInfo) -> Cross:
         if value.r_b is not None and not value.r_b > 0.0:
             raise refuse("R is not larger than pin.l", "give cross.R > pin.l, or cross.r_b")
+        return value
+
+    @field_validator("thrust")
+    @classmethod
+    def _faces_are_near(cls, value: Thrust | None, info: ValidationInfo) -> Thrust | None:
+        """Refuse faces farther from the ends of their pins than the model holds for."""
+        cross, share = info.data.get("cross"), 2.0 * MAX_SHIFT
+        if value is not None and cross is not None and abs(value.end_play) > share * cross.R:
+            found = f"end_play = {{thrust.end_play}} is more than {share:g} cross.R = {1e3 * share * cross.R:.4g} mm"
+            raise refuse(
+                found,
+                f"check its unit; give {-1e3 * share * cross.R:.4g} mm to {1e3 * share * cross.R:.4g} mm",
+                "thrust.end_play",
+            )
         return value
 
     @field_validator("contact")

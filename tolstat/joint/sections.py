@@ -36,6 +36,20 @@ def _poisson(nu: float) -> float:
     return nu
 
 
+def _friction(mu: float) -> float:
+    if mu > 1.0:
+        raise refuse("{mu} is above 1", "give the coefficient of friction of the bearings, such as 0.05", "mu")
+    return mu
+
+
+def _grade(grade: float) -> float:
+    if grade > LARGEST_GRADE:
+        raise refuse(
+            "{grade} is above G 4000, the largest grade", 'write the number of the grade in mm/s, "16 mm/s"', "grade"
+        )
+    return grade
+
+
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
@@ -46,6 +60,8 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 
 LEAST_E = 1e9
 """Young's modulus (Pa) below that of any metal."""
+LARGEST_GRADE = 4.0
+"""Largest balance quality grade of ISO 21940-11, m/s."""
 Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterValidator(_body)]
 
 
@@ -166,7 +182,8 @@ class Thrust(Strict):
     """Thrust faces: the bottoms of the bearing cups, held by snap rings, which hold the cross along its pins."""
 
     end_play: units.Length = Field(examples=["0.02 mm"])
-    """play of the cross along a pair of pins, from one face to the other; negative: preload"""
+    """play of the cross along a pair of pins, from one face to the other; negative: preload; up to a fifth of cross.R
+    either way"""
     k: Stiffness = Field(examples=["1e8 N/m"])
     """stiffness of one face, its cup and its ring"""
     c: units.Damping = Field(default=2e3)
@@ -176,11 +193,12 @@ class Thrust(Strict):
 class Friction(Strict):
     """Friction of the pins in their bearings."""
 
-    mu: Ratio | None = Field(default=None, examples=[0.05])
-    """coefficient of friction: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15; when left out: no friction"""
+    mu: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
+    """coefficient of friction, up to 1: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15; when left out: no
+    friction"""
     radius: Length | None = Field(default=None, examples=["12.5 mm"])
     """distance from the pin's axis at which surfaces slide; when left out: contact.D_P/2"""
-    slip_speed: Annotated[units.Velocity, POSITIVE] = 1e-2
+    slip_speed: Annotated[units.Velocity, POSITIVE] = Field(default=1e-2, examples=["0.01 m/s"])
     """sliding speed over which friction rises"""
 
 
@@ -189,8 +207,10 @@ class Unbalance(Strict):
 
     amount: units.Unbalance | None = Field(default=None, examples=["1e-3 kg*m"])
     """unbalance: mass times distance of its centre from the axis"""
-    grade: Annotated[units.Velocity, POSITIVE] | None = Field(default=None, examples=["16 mm/s"])
-    """balance quality grade G of ISO 21940-11: distance times angular velocity; its number is in mm/s"""
+    grade: Annotated[units.Velocity, POSITIVE, AfterValidator(_grade)] | None = Field(
+        default=None, examples=["16 mm/s"]
+    )
+    """balance quality grade G of ISO 21940-11: distance times angular velocity; its number is in mm/s, up to 4000"""
     mass: units.Mass | None = Field(default=None, examples=["5 kg"])
     """mass that the grade is for"""
     speed: Annotated[units.Speed, POSITIVE] | None = Field(default=None, examples=["3000 rpm"])

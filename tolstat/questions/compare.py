@@ -17,7 +17,7 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.columns import DRAWN
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError, raise_all
-from tolstat.common.loads import ANY_LIMIT, unit_text
+from tolstat.common.loads import ANY_LIMIT, split, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
@@ -215,9 +215,9 @@ def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[
     common = [name for name in a.kept_loads if name in b.kept_loads]
     asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
     raise_all(
-        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, common))
+        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(split(name)[0], common))
         for name, option in asked.items()
-        if name not in common
+        if split(name)[0] not in common
     )
     return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in common]
 

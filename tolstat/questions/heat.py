@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Row, Rows, Sentence, Table, has
@@ -15,8 +16,13 @@ from tolstat.store.view import View
 
 
 def _cell(key: str) -> Cell:
-    """Make a `Column.cell` of a power, or of an efficiency in per cent."""
-    return lambda row: f"{100.0 * row[key]:.3f} %" if row["unit"] == "1" else text.value(row[key], row["unit"])
+    """Make a `Column.cell` of a power, or of an efficiency in per cent; NaN gives a dash."""
+
+    def cell(row: Row) -> str:
+        is_share = row["unit"] == "1" and not np.isnan(row[key])
+        return f"{100.0 * row[key]:.3f} %" if is_share else text.value(row[key], row["unit"])
+
+    return cell
 
 
 def _has_points(rows: Rows) -> bool:
@@ -31,8 +37,9 @@ COLUMNS = (
     Column("95 % are better than", _cell("bound")),
 )
 MEANING = (
-    "Loss: power that friction turns into heat, mean over a revolution. Efficiency: 1 - loss/(mean driving power); the "
-    "mean driving power is the loss and the mean torque times the mean speed of the output shaft"
+    "Loss: power that friction turns into heat, mean over a revolution. Efficiency: 1 - loss/(mean driving power), not "
+    "below zero; the mean driving power is the loss and the mean torque times the mean speed of the output shaft, or "
+    "that product alone where the output shaft drives. No torque: none"
 )
 LEFT_OUT = (
     "Left out of the efficiency: that torque and speed swing together; damping of bushings and contacts, the oil film, "
@@ -53,7 +60,8 @@ def heat(view: View) -> Answer:
     Answer
         Table ``heat``, at each operating point one row for the loss of all bearings, one for that of each pin's bearing
         and one for the efficiency: ``point``, ``of``, ``load`` (empty for the efficiency), ``unit`` (W or 1),
-        ``nominal`` (NaN without a nominal joint), ``median``, and ``bound``, which 95 % of the joints are better than.
+        ``nominal`` (NaN without a nominal joint), ``median``, and ``bound``, which 95 % of the joints are better than;
+        an efficiency is NaN where no torque is transmitted.
 
     Raises
     ------
@@ -88,7 +96,14 @@ def _efficiency(view: View) -> Row:
         [(means.torque + each["operation.torque"]) * (means.speed + each["operation.speed"]) for each in blocks]
     )
     valid = np.isin(view.status, [int(state) for state in VALID])
-    every = 1.0 / (1.0 + loss.values[valid] / np.abs(power[valid]))
-    nominal = 1.0 / (1.0 + loss.nominal / abs(means.torque * means.speed)) if means.torque else 0.0
+    every = _share_left(loss.values[valid], power[valid])
+    nominal = _share_left(np.array(loss.nominal), np.array(means.torque * means.speed))
     ends = {"median": float(np.median(every)), "bound": float(np.quantile(every, 0.05))}
-    return {"of": "efficiency", "load": "", "unit": "1", "nominal": nominal} | ends
+    return {"of": "efficiency", "load": "", "unit": "1", "nominal": float(nominal)} | ends
+
+
+def _share_left(loss: FloatArray, power: FloatArray) -> FloatArray:
+    """Efficiency with which joints transmit a mean power of the output shaft, W; below zero, that shaft drives."""
+    driving = np.where(power > 0.0, power + loss, -power)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(power == 0.0, np.nan, np.maximum(1.0 - loss / driving, 0.0))

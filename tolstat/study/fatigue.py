@@ -16,6 +16,7 @@ from tolstat.common import units
 from tolstat.common.channels import FORCES_AND_TORQUES, WORST, Channel, channels, components, planes, unit_of
 from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import kinds as kinds_of
+from tolstat.common.loads import loads_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.strict import Strict, did_you_mean, dotted, read_section, read_toml, refuse
@@ -363,6 +364,9 @@ def counted_names(entry: Entry, place: str, mechanism: Mechanism) -> list[str]:
     if not selected and unsigned and not at:
         found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
         raise input_error(where, found, _signed(unsigned[0], mechanism))
+    if not selected and select(plane, loads_of(mechanism)):
+        remedy = 'write components or directions, such as cross1.F_t, input.f_x, "input.lateral at worst"'
+        raise input_error(where, "selects loads of which cycles are not counted", remedy)
     if not selected:
         raise input_error(where, "selects nothing", suggestion(plane, list(names)))
     if not at:

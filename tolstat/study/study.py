@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -19,6 +19,7 @@ from tolstat.common.loads import limits_in_words, loads_of, split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
+from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import Joint, Operation, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
@@ -30,8 +31,10 @@ from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.points import Point, Setting, limits_at, only_one
 from tolstat.study.tolerances.correlation import Copula, Lot
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.entry import SingleEntry, Toleranced
 from tolstat.study.tolerances.fits import Fit
+
+MU = "friction.mu"
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,14 +135,33 @@ class Study:
         return lined
 
     def check_mounting(self) -> None:
-        """Refuse settings without effect, see `points.refusals`.
+        """Refuse settings without effect, see `points.refusals`, and deviations that make friction negative.
 
         Raises
         ------
         InputError
             With every such setting.
         """
-        raise_all([self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)])
+        refused = [*points.refusals(self._settings, self._varied), *self._negative_friction()]
+        raise_all([self.fault(dotted(path), *texts) for path, *texts in refused])
+
+    def _negative_friction(self) -> Iterator[tuple[KeyPath, str, str]]:
+        """Deviations that take the friction of a joint below zero, as `points.refusals` yields what it refuses."""
+        mu = min((joint.friction.mu for joint in self.joints if joint.friction.mu is not None), default=math.inf)
+        key, listed = MU.split("."), self.listed
+        given: list[tuple[KeyPath, float]] = [(("errors", *key), self.errors.get(MU, 0.0))]
+        for number, errors in enumerate(listed.cases.values() if listed else ()):
+            given.append((("case", number - 1, "errors", *key), errors.get(MU, 0.0)))
+        given.append(
+            (("grid", *key), min((point.get(MU, 0.0) for point in (listed.points if listed else ())), default=0.0))
+        )
+        for site, model in (both for entry in self.entries for both in entry.models):
+            if site.name == MU and isinstance(model, SingleEntry):
+                given.append((("tolerances", *key), model.least(site)))
+        for path, least in given:
+            if mu + least < 0.0:
+                found = f"takes friction.mu = {mu:g} of the joint down to {mu + least:.3g}, below zero"
+                yield path, found, f"give no deviation below {-mu:g}"
 
     @property
     def known(self) -> tuple[Toleranced, ...]:

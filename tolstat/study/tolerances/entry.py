@@ -107,7 +107,7 @@ Value = Annotated[float, _reader(""), OF_ERROR]
 
 
 _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
-"""Probabilities between which an error of the operating point must be zero."""
+"""Probabilities between which an error of the operating point must be zero; ends of a distribution without a band."""
 
 
 Positive = Annotated[Value, AfterValidator(units.positive)]
@@ -170,6 +170,11 @@ class SingleEntry(ToleranceEntry):
     @abstractmethod
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""
+
+    def least(self, site: Site) -> float:
+        """Lower limit; where none is given, what one part in a thousand is below."""
+        band = self.band(site)
+        return float(self.build(site).ppf(_NEARLY_ALL)[0]) if band is None else band[0]
 
     def quantities(self, site: Site) -> dict[str, Distribution]:
         """See `ToleranceEntry.quantities`."""

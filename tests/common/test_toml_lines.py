@@ -86,18 +86,19 @@ def test_a_long_list_is_not_read_again_at_each_line(monkeypatch: pytest.MonkeyPa
     assert sum(read) < 3 * len(text)
 
 
-def test_a_fault_has_the_line_of_its_key_or_of_the_table_around_it() -> None:
+def test_a_fault_has_the_line_of_its_key_or_of_the_table_around_it_and_faults_are_sorted_by_it() -> None:
     places = {
+        "b.toml: joint": "b.toml: joint",
+        "a.toml": "a.toml",
         "a.toml: tolerances.pin[12].offset_t.plus_minus": "a.toml:6: tolerances.pin[12].offset_t.plus_minus",
         "a.toml: tolerances.pin1.tilt_t.distribution": "a.toml:7: tolerances.pin1.tilt_t.distribution",
-        "a.toml: correlation[1].inner.list[1].k": "a.toml:24: correlation[1].inner.list[1].k",
         "a.toml: correlation[0].between[1].deep[7]": "a.toml:12: correlation[0].between[1].deep[7]",
-        "a.toml: joints": "a.toml: joints",
+        "a.toml: correlation[1].inner.list[1].k": "a.toml:24: correlation[1].inner.list[1].k",
         "a.toml: limits.psi": "a.toml: limits.psi",
-        "a.toml": "a.toml",
-        "b.toml: joint": "b.toml: joint",
+        "a.toml: joints": "a.toml: joints",
     }
-    faults = [Fault(place, "found", "remedy") for place in places]
+    named = ["b.toml: joint", "a.toml", "a.toml: limits.psi", "a.toml: joints"]  # without line, they keep their order
+    faults = [Fault(place, "found", "remedy") for place in (*(p for p in reversed(places) if p not in named), *named)]
     assert [fault.place for fault in with_lines(faults, "a.toml", TEXT)] == list(places.values())
 
 

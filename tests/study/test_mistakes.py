@@ -143,6 +143,66 @@ def test_quotes_and_decimal_commas(folder: Path, old: str, new: str, line: int, 
     assert message.endswith(f"\n  hint: {remedy}")
 
 
+BEARINGS, TABLE = 'for example bearings = ["80 mm", "240 mm"]', "is not a table\n  hint: write a table, for example"
+
+
+@pytest.mark.parametrize(
+    ("written", "expected"),
+    [
+        (
+            'input.bearings = ["70 mm", "70 mm"]',
+            "70 mm, 70 mm: both bearings are at one place\n  hint: give the distance",
+        ),
+        ('input.bearings = ["90 mm", "70 mm"]', "90 mm, 70 mm are not in order\n  hint: give the nearer bearing first"),
+        ('input.bearings = ["1 m", "2 m", "3 m"]', f"['1 m', '2 m', '3 m'] has 3 entries\n  hint: give 2, {BEARINGS}"),
+        ('input.bearings = ["70 mm"]', f"['70 mm'] has too few entries\n  hint: give all, {BEARINGS}"),
+        ('input.bearings = "70 mm"', f"'70 mm' is not a list\n  hint: write a list in [ ], {BEARINGS}"),
+        ('input.bearings = "free"', "'free' is not a list\n  hint: write shaft.axial = \"free\""),
+        ('output = "free"', "'free' is not a table\n  hint: write shaft.axial = \"free\""),
+        ('output = "1 m"', f'\'1 m\' {TABLE} output = {{ bearings = ["80 mm", "240 mm"] }}'),
+        ('unbalance = "5 g*mm"', f"'5 g*mm' {TABLE} unbalance = {{ amount = "),
+        ("unbalance = {}", "has neither amount nor grade, mass and speed\n  hint: give amount = "),
+        ('unbalance.grade = "16 mm/s"', "has grade without mass and speed\n  hint: add mass and speed, or give amount"),
+        ('unbalance = { amount = "1 g*mm", mass = "5 kg" }', "has amount beside mass\n  hint: remove amount, or mass"),
+    ],
+)
+def test_bearings_and_unbalance_of_shafts(folder: Path, written: str, expected: str) -> None:
+    (message,) = refused(folder, STUDY.replace("[operation]", f"shaft.{written}\n[operation]"))
+    key = written.partition(" ")[0].replace("unbalance.grade", "unbalance")
+    assert message.startswith(f":3: joint.shaft.{key}: {expected}")
+
+
+@pytest.mark.parametrize(
+    ("written", "remedy"),
+    [
+        ('snap_rings.end_play = "0.02 mm"', "snap rings and cups are thrust: thrust = {"),
+        ('bearing.C0 = "12 kN"', "the static load rating is used nowhere: leave it out"),
+        ("friction.coefficient_of_friction = 0.05", "this is friction.mu under [joint]"),
+    ],
+)
+def test_words_of_the_trade(folder: Path, written: str, remedy: str) -> None:
+    messages = refused(
+        folder, STUDY.replace("own_joint.toml", "pin25").replace("[operation]", f"{written}\n[operation]")
+    )
+    assert any(f": unknown key\n  hint: {remedy}" in message for message in messages)
+
+
+def test_keys_of_friction_without_its_coefficient(folder: Path) -> None:
+    study = STUDY.replace("own_joint.toml", "cirelli2021")
+    with_radius = study.replace("[operation]", 'friction.radius = "9 mm"\n[operation]')
+    (message,) = refused(folder, with_radius)
+    assert message.startswith(":3: joint.friction.radius: has no effect without friction.mu")
+    assert load(folder, with_radius.replace("[operation]", "friction.mu = 0.05\n[operation]")).joint.warnings() == []
+    assert load(folder, study).joint.warnings() == []
+    default = (data_dir() / "joints" / "cirelli2021.toml").read_text("utf-8")
+    (folder / "copy.toml").write_text(default, "utf-8")
+    assert load(folder, STUDY.replace("own_joint", "copy")).joint.warnings() == []
+    (folder / "radius.toml").write_text(default.replace('radius = "19 mm"', 'radius = "18 mm"'), "utf-8")
+    (warning,) = load(folder, STUDY.replace("own_joint", "radius")).joint.warnings()
+    assert warning.place == "friction.radius"
+    assert "without friction.mu" in warning.found
+
+
 def test_a_joint_file_is_no_study_and_a_study_no_joint_file(folder: Path) -> None:
     shutil.copy(data_dir() / "joints" / "cirelli2021.toml", folder / "joint.toml")
     for read in (study.load, study.load_case):

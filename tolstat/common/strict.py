@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import ast
 import difflib
-import inspect
 import json
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
-from importlib import import_module
-from itertools import pairwise
+from math import inf
+from operator import itemgetter
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args, get_origin
 
-import annotated_types
-from pydantic import AfterValidator, BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from tolstat.common import toml_lines, units
+from tolstat.common import json_schema, toml_lines, units, words
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.files import about_encoding, read_input
-from tolstat.common.notation import schema_of_sign
 
 
 class Strict(BaseModel):
@@ -37,7 +32,7 @@ class Strict(BaseModel):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema with bounds of quantities."""
         schema = handler(core)
-        _complete(handler.resolve_ref_schema(schema), cls)
+        json_schema.complete(handler.resolve_ref_schema(schema), cls)
         return schema
 
 
@@ -96,7 +91,7 @@ def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
 
 
 def with_lines(faults: Sequence[Fault], place: str, text: str | Mapping[str, int]) -> list[Fault]:
-    """Add the line to the place of each fault of a file.
+    """Add the line to the place of each fault of a file, and sort them by it.
 
     Parameters
     ----------
@@ -111,21 +106,25 @@ def with_lines(faults: Sequence[Fault], place: str, text: str | Mapping[str, int
     -------
     list of Fault
         ``study.toml:12: sampling.n`` for ``study.toml: sampling.n``. A missing key has the line of the innermost table
-        around it that the file has; a fault without key path has no line.
+        around it that the file has; a fault without key path has no line. Faults of other files come first, missing
+        tables last.
     """
     if isinstance(text, str):
         text = {dotted(path): line for path, line in toml_lines.of_keys(text).items()}
-    return [_with_line(fault, place, text) for fault in faults]
+    lined = [_with_line(fault, place, text) for fault in faults]
+    return [fault for _, fault in sorted(lined, key=itemgetter(0))]
 
 
-def _with_line(fault: Fault, place: str, lines: Mapping[str, int]) -> Fault:
+def _with_line(fault: Fault, place: str, lines: Mapping[str, int]) -> tuple[float, Fault]:
     path = fault.place.removeprefix(f"{place}: ")
     if path == fault.place:
-        return fault
+        return 0, fault
     above = path
     while above and above not in lines:
         above = above[: max(above.rfind("."), above.rfind("["), 0)]
-    return replace(fault, place=f"{place}:{lines[above]}: {path}") if above else fault
+    if not above:
+        return inf, fault
+    return lines[above], replace(fault, place=f"{place}:{lines[above]}: {path}")
 
 
 @contextmanager
@@ -186,7 +185,8 @@ def validate(
         return model.model_validate(data, context=context)
     except ValidationError as error:
         each = error.errors(include_url=False)
-        raise InputError([_fault(e, model, data, place, prefix, examples or {}) for e in each]) from error
+        faults = [_fault(e, model, data, place, prefix, examples or {}) for e in each]
+        raise InputError(list(dict.fromkeys(faults))) from error
 
 
 _REMEDIES = {
@@ -195,15 +195,25 @@ _REMEDIES = {
     "less_than": "give a value below {lt}",
     "less_than_equal": "give a value of at most {le}",
     "too_short": "give at least {min_length} entries",
+    "too_long": "give {max_length}",
     "int_type": "write a whole number, without quotes",
     "int_from_float": "write a whole number",
     "bool_type": "write true or false, without quotes",
     "string_type": "write a text in quotes",
     "list_type": "write a list in [ ]",
+    "tuple_type": "write a list in [ ]",
     "dict_type": "write a table",
     "model_type": "write a table",
 }
 """Remedy for a kind of pydantic error, filled from the error's context."""
+_FOUND = {
+    "too_long": "has {actual_length} entries",
+    "list_type": "is not a list",
+    "tuple_type": "is not a list",
+    "dict_type": "is not a table",
+    "model_type": "is not a table",
+}
+"""What is said of the value in place of pydantic's text; the remedy ends with an example."""
 
 
 def _fault(
@@ -221,12 +231,27 @@ def _fault(
     if e["type"] == "extra_forbidden":
         keys = [field.alias or name for name, field in _fields_around(model, e["loc"]).items()]
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), keys))
+    if e["type"] == "missing" and isinstance(e["loc"][-1], int):
+        example = _example(model, e["loc"][:-1], known)
+        return Fault(where.rpartition("[")[0], f"{e['input']!r} has too few entries", f"give all{example}")
     if e["type"] == "missing":
         return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"], known))
     if e["type"] in ("literal_error", "enum"):
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
     remedy = _REMEDIES.get(e["type"], "give a value of the expected type").format(**context)
-    return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
+    if e["type"] not in _FOUND:
+        return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
+    remedy = _as_word(model, e["loc"], e["input"]) or remedy + _example(model, e["loc"], known)
+    return Fault(where, f"{e['input']!r} {_FOUND[e['type']].format(**context)}", remedy)
+
+
+def _as_word(model: type[BaseModel], location: Sequence[int | str], word: object) -> str:
+    """Remedy for a word that a key of the tables around a place takes: ``write shaft.axial = "free"``; else empty."""
+    for depth in range(len(location), 0, -1):
+        for name, field in _fields_around(model, location[:depth]).items():
+            if any(word in kind.words for kind in field.metadata if isinstance(kind, units.Quantity)):
+                return f"write {dotted((*location[: depth - 1], name))} = {json.dumps(word)}"
+    return ""
 
 
 def _written(data: object, location: Sequence[int | str], key: Sequence[str]) -> str:
@@ -247,7 +272,9 @@ def _written(data: object, location: Sequence[int | str], key: Sequence[str]) ->
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
-    """Remedy for an unknown word: the closest of the allowed ones, else all of them."""
+    """Remedy for an unknown word: what a word of the trade means, else the closest of the allowed ones, else all."""
+    if remedy := words.remedy(word):
+        return remedy
     spelt = {name.lower(): name for name in allowed}
     close = difflib.get_close_matches(word.lower(), spelt, n=1)
     return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
@@ -272,12 +299,28 @@ def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dic
 
 def _example(model: type[BaseModel], location: Sequence[int | str], known: Mapping[str, Any]) -> str:
     """How a file writes the key at a path, as its field has it: `` = "22 mm"``; empty where no example is known."""
+    example = _example_at(model, location, known) if location else None
+    return "" if example is None else f", for example {location[-1]} = {_inline(example)}"
+
+
+def _example_at(model: type[BaseModel], location: Sequence[int | str], known: Mapping[str, Any]) -> Any:
+    """Example of the value at a path; of a table the keys that it must have, or its first one."""
     fields = _fields_around(model, location).items()
-    examples = next((field.examples for name, field in fields if location[-1] in (name, field.alias)), None)
-    example = examples[0] if examples else known.get(dotted(location))
-    if example is None or isinstance(example, (Mapping, list)):
-        return ""
-    return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
+    if examples := next((field.examples for name, field in fields if location[-1] in (name, field.alias)), None):
+        return examples[0]
+    inside = {field.alias or name: field for name, field in _fields_around(model, (*location, "")).items()}
+    each = {key: value for key in inside if (value := _example_at(model, (*location, key), known)) is not None}
+    needed = {key: value for key, value in each.items() if inside[key].is_required()}
+    return needed or dict(list(each.items())[:1]) or known.get(dotted(location))
+
+
+def _inline(value: Any) -> str:
+    """Value as TOML writes it on one line."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {_inline(inner)}' for key, inner in value.items())} }}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_inline, value))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:
@@ -287,84 +330,3 @@ def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:
     has it: faults show the numbers and units of the user.
     """
     return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy, "keys": keys})
-
-
-def _complete(schema: dict[str, Any], model: type[BaseModel]) -> None:
-    """Add to the JSON schema of a model what pydantic leaves out of it.
-
-    Parameters
-    ----------
-    schema : dict
-        Schema of the model, changed in place: meanings that are docstrings, bounds of quantities, defaults that are
-        made by a function; titles and null, which TOML does not have, are removed.
-    model : type
-        The model.
-    """
-    schema.pop("title", None)
-    meanings = _meanings(model)
-    for name, field in model.model_fields.items():
-        property_schema = schema["properties"][field.alias or name]
-        if name in meanings:
-            property_schema.setdefault("description", meanings[name])
-        property_schema.pop("title", None)
-        rest = [inner for inner in property_schema.get("anyOf", []) if inner != {"type": "null"}]
-        if len(rest) == 1:
-            del property_schema["anyOf"]
-            property_schema |= rest[0] | property_schema
-        elif rest:
-            property_schema["anyOf"] = rest
-        property_schema |= _bounds(field, property_schema)
-        if field.default_factory and (made := field.get_default(call_default_factory=True)):
-            property_schema["default"] = made
-        if property_schema.get("default", 0) is None or isinstance(field.default, BaseModel):
-            property_schema.pop("default", None)
-
-
-def _meanings(model: type[BaseModel]) -> dict[str, str]:
-    """Docstring of each field, of the model itself and of those that it extends.
-
-    Pydantic's ``use_attribute_docstrings`` reads them while a model is defined, which all commands would wait for.
-    """
-    bases = [base for base in reversed(model.__mro__) if issubclass(base, BaseModel) and base is not BaseModel]
-    return {name: text for base in bases for name, text in _docstrings(base.__module__).get(base.__name__, {}).items()}
-
-
-@cache
-def _docstrings(module: str) -> dict[str, dict[str, str]]:
-    """Docstrings below the attributes of each class of a module."""
-    return {
-        node.name: {
-            field.target.id: " ".join(str(below.value.value).split())
-            for field, below in pairwise(node.body)
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-            if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        }
-        for node in ast.parse(inspect.getsource(import_module(module))).body
-        if isinstance(node, ast.ClassDef)
-    }
-
-
-def _bounds(field: FieldInfo, property_schema: Mapping[str, Any]) -> dict[str, Any]:
-    """Bounds of a quantity, or of a quantity that may be left out."""
-    bounds: dict[str, Any] = {}
-    for item in _metadata(field.annotation, field.metadata):
-        match item:
-            case annotated_types.Gt(gt=bound):
-                bounds["exclusiveMinimum"] = bound
-            case annotated_types.Ge(ge=bound):
-                bounds["minimum"] = bound
-            case annotated_types.Lt(lt=bound):
-                bounds["exclusiveMaximum"] = bound
-            case annotated_types.Le(le=bound):
-                bounds["maximum"] = bound
-            case AfterValidator(func=func) if func in units.SIGNS:
-                bounds[units.SIGNS[func]] = 0
-    return bounds | schema_of_sign({**property_schema, **bounds})
-
-
-def _metadata(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
-    """Metadata of an annotation, and of those inside it that it is a union of."""
-    yield from metadata
-    for inner in get_args(annotation):
-        if hasattr(inner, "__metadata__"):
-            yield from inner.__metadata__

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, input_error
+from tolstat.common.errors import Fault, InputError, input_error, raise_all
 from tolstat.common.files import data_dir
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import validate
@@ -19,6 +19,8 @@ from tolstat.joint.model import Assumed, Joint, affects_results, laid_over, leav
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
+OF_FRICTION = {"friction.radius", "friction.slip_speed"}
+NO_MU = "has no effect without friction.mu: there is no friction", "give friction.mu, too, or remove this key"
 
 
 def load(
@@ -70,9 +72,16 @@ def load(
             raise InputError(faults)
     merged = leaves(overridden(data, overrides))
     given, in_file = leaves(overrides).keys(), leaves(data)
+    without_mu = [] if joint.friction.mu is not None else [key for key in given | in_file if key in OF_FRICTION]
+    raise_all(Fault(f"{place}: {section}.{key}", *NO_MU) for key in sorted(given & {*without_mu}))
+    own = [key for key in sorted(without_mu) if in_file[key] != examples().get(key)]
     gone = derived.replaced(given, in_file)
     joint.remember(
-        [*_inherited(joint, given, in_file, gone, path), *_lowered(joint, merged.get("contact.fit_load"))],
+        [
+            *_inherited(joint, given, in_file, gone, path),
+            *_lowered(joint, merged.get("contact.fit_load")),
+            *(Fault(key, *NO_MU) for key in own),
+        ],
         {key: str(in_file[key]) for key in derived.BEARING if key in in_file and key in given | gone},
     )
     return joint

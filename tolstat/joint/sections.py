@@ -173,8 +173,10 @@ class Ends(Strict):
     @field_validator("bearings")
     @classmethod
     def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if not value[0] < value[1]:
-            raise refuse("{bearings} are not two places in order", "give the nearer bearing first", "bearings")
+        if value[0] == value[1]:
+            raise refuse("{bearings}: both bearings are at one place", "give the distance of each", "bearings")
+        if value[0] > value[1]:
+            raise refuse("{bearings} are not in order", "give the nearer bearing first", "bearings")
         return value
 
 
@@ -220,9 +222,16 @@ class Unbalance(Strict):
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Unbalance:
-        of_grade = [self.grade, self.mass, self.speed]
-        if (self.amount is None) != (None not in of_grade) or (self.amount is not None and any(of_grade)):
-            raise refuse("needs amount, or grade, mass and speed, not both", "give one of the two")
+        of_grade = ("grade", "mass", "speed")
+        given = " and ".join(key for key in of_grade if getattr(self, key) is not None)
+        lacking = " and ".join(key for key in of_grade if getattr(self, key) is None)
+        if self.amount is not None and given:
+            raise refuse(f"has amount beside {given}", f"remove amount, or {given}")
+        if self.amount is None and not given:
+            remedy = 'give amount = "1e-3 kg*m", or grade = "16 mm/s", mass = "5 kg" and speed = "3000 rpm", of yours'
+            raise refuse("has neither amount nor grade, mass and speed", remedy)
+        if self.amount is None and lacking:
+            raise refuse(f"has {given} without {lacking}", f"add {lacking}, or give amount instead")
         return self
 
     @property

@@ -318,10 +318,10 @@ class Reading:
             With every fault; those of the file have its lines.
         """
         if self.faults:
-            lined = strict.with_lines(self.faults, self.place, self._source) if self._has_lines else self.faults
-            other = f"{self.place}: {from_command_line}"
-            pairs = zip(self.faults, lined, strict=True)
-            raise InputError([fault if fault.place == other else with_line for fault, with_line in pairs])
+            other = [fault for fault in self.faults if fault.place == f"{self.place}: {from_command_line}"]
+            of_file = [fault for fault in self.faults if fault not in other]
+            lined = strict.with_lines(of_file, self.place, self._source) if self._has_lines else of_file
+            raise InputError([*other, *lined])
 
     def table(self, section: str) -> Mapping[str, Any]:
         """Section that is a table; empty if it is missing or something else."""

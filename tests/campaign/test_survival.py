@@ -105,7 +105,7 @@ def test_a_joint_that_kills_in_the_check_of_a_run_does_not_end_it(tmp_path: Path
         found = verification.read(store)
     assert found is not None
     status = {name: check.results["status"].tolist() for name, check in found.checks.items()}
-    assert status == {"half_step": [Status.CRASHED], "newton": [Status.OK], "settling": [Status.OK]}
+    assert status == {"finer": [Status.CRASHED, Status.CRASHED]}
 
 
 def simulate_checks_badly(params: np.ndarray, options: Options, **kept: Any) -> Simulation:

@@ -15,8 +15,8 @@ from tests.support.of_cardan import CARDAN, LOAD_KINDS
 from tests.support.reports import call
 from tolstat import joint, sampling, study
 from tolstat.analysis import accuracy
+from tolstat.campaign import chosen, verify
 from tolstat.campaign import run as campaign
-from tolstat.campaign import verify
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
 from tolstat.questions import accuracy as question
@@ -115,7 +115,10 @@ def test_each_check_changes_what_it_says():
     for method in Method:
         assert verify.options_of_check(options._replace(method=int(method)), "method").method != method
     # types of the fields decide which compiled code runs
-    for name in verify.ALL_CHECKS:
+    finer = verify.options_of_check(options, "finer")
+    assert finer == options._replace(steps_per_rev=360, newton_tol=finer.newton_tol, settle_tol=finer.settle_tol)
+    assert (finer.newton_tol, finer.settle_tol) == (0.01 * options.newton_tol, 0.01 * options.settle_tol)
+    for name in (*verify.QUICK_CHECKS, *verify.ALL_CHECKS):
         assert [type(x) for x in verify.options_of_check(options, name)] == [type(x) for x in options]
 
 
@@ -166,26 +169,72 @@ def test_errors_of_a_vanishing_load_are_relative_to_other_joints():
     assert accuracy.differences(base, other, CARDAN)[:2, number] == pytest.approx([-1e-10, -1e-8], rel=1e-3)
 
 
-def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
+def test_a_run_checks_joints_at_random_and_the_nearest_of_the_others_and_a_file_gives_them_back(tmp_path):
     path = tmp_path / "a.h5"
     fakes.run(fakes.Study(n=900), path, check=True)
     with ResultFile.open(path) as store:
-        found = verification.read(store)
+        found, near = verification.read(store), verification.read(store, verification.NEAR)
         assert found is not None
-        assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
+        assert near is not None
+        settled = np.flatnonzero(store.status()[1:] == Status.OK) + 1
+        assert found.rows.tolist() == verify.choose(settled, 29, 7).tolist()
         assert np.array_equal(found.base, store.results()[found.rows])
+        others = settled[~np.isin(settled, found.rows)]
+        distance = np.abs(store.results()["F_max"][others, 0] - 700.0)
+        assert near.rows.tolist() == sorted(others[np.argsort(distance, kind="stable")[:29]].tolist())
     assert tuple(found.checks) == verify.QUICK_CHECKS
     for name, check in found.checks.items():
         # the invented solver knows no settings but the number of steps
         expected = found.base.copy()
-        expected["steps"] *= 2 if name == "half_step" else 1
+        expected["steps"] *= 2
         assert np.array_equal(check.results, expected)
         assert from_names(check.options) == verify.options_of_check(Options(steps_per_rev=30), name)
     with Writer.open(path) as store:
-        verification.write([(store, found._replace(rows=found.rows[:1], checks={}))])
+        verification.write([(store, verification.VERIFY, found._replace(rows=found.rows[:1], checks={}))])
         again = verification.read(store)
     assert again is not None
     assert (again.rows.tolist(), again.checks) == ([found.rows[0]], {})
+
+
+@pytest.mark.parametrize(("n", "limits", "at_random", "near"), [(20, 1, 20, 0), (41, 1, 29, 12), (90, 0, 58, 0)])
+def test_of_few_joints_all_are_checked_and_without_limits_all_are_chosen_at_random(
+    tmp_path, n, limits, at_random, near
+):
+    plan = fakes.Study(n=n, limits={"cross1.F": 700.0} if limits else {})
+    fakes.run(plan, tmp_path / "a.h5", check=True)
+    with ResultFile.open(tmp_path / "a.h5") as store:
+        found = [verification.read(store, name) for name in (verification.VERIFY, verification.NEAR)]
+        settled = np.flatnonzero(store.status()[1:] == Status.OK)
+    numbers = [0 if part is None else len(part.rows) for part in found]
+    failed = n - len(settled)
+    assert numbers == [min(at_random, n - failed), max(near - failed, 0) if n < 58 else near]
+
+
+def test_more_joints_are_checked_of_large_campaigns():
+    assert [chosen.few(n) for n in (10, 1024, 5900, 29_900, 10**7)] == [29, 29, 59, 299, 299]
+
+
+def test_the_largest_of_n_joints_is_above_the_share_that_is_said():
+    """Of uniform numbers, with the confidence that is said; of one more share it is not."""
+    rng = np.random.default_rng(8)
+    for n in (1, 20, 59):
+        largest = rng.random((20_000, n)).max(axis=1)
+        share = accuracy.share_below_largest(n)
+        assert np.mean(largest > share) == pytest.approx(0.95, abs=0.006)
+
+
+def test_the_sentence_says_what_the_largest_error_is_a_bound_of(tmp_path):
+    fakes.run(fakes.Study(n=900), tmp_path / "a.h5", check=True)
+    with ResultFile.open(tmp_path / "a.h5") as store:
+        view = store.view()
+        assert view.verification is not None
+        words = question.error_of_view(view, view.verification)
+        several = verification.together([view.verification, view.verification])  # two operating points, the same joints
+    assert "estimated on 29 joints from half the step and smaller tolerances: F median 0.0e+00, largest" in words
+    assert "; with 95 % confidence 90 % of all joints are below the largest" in words
+    assert "; largest of the 29 joints nearest to limits: F 0.0e+00" in words
+    assert "90 % of all joints" in question.error_note(several, CARDAN)
+    assert "of all joints" not in question.error_note(several, CARDAN, is_sample=False)
 
 
 def test_a_run_can_do_without(tmp_path):
@@ -202,7 +251,7 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
         solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
         monkeypatch.setattr(verify, "parameters", lambda store, slots: slots)
         checked = verify.check_campaign(store, 3, 7, partial(verify.run_checks, names=("newton",), simulate=solve))
-        verification.write([(store, checked)])
+        verification.write([(store, verification.VERIFY, checked)])
     with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)
     assert set(found.rows.tolist()) <= set(rows)
@@ -217,7 +266,7 @@ def off_by(path, factor, rows=(5, 9)):
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
             true[name] *= factor
         made = {name: Check("", {}, base) for name in verify.QUICK_CHECKS} | {"reference": Check("", {}, true)}
-        verification.write([(store, Verification(1, np.array(rows), base, made))])
+        verification.write([(store, verification.VERIFY, Verification(1, np.array(rows), base, made))])
 
 
 @pytest.mark.slow
@@ -241,7 +290,9 @@ def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     (head,) = (line for line in lines if line.startswith("load "))
     assert verdict.startswith("No verdict")
     assert head.split()[-2:] == ["total", "interval"]
-    assert "measured on 2 of 2 joints against a tight reference: F 2.0e-01" in done.stderr
+    assert "measured on 2 of 2 joints against a tight reference: F median 2.0e-01, largest 2.0e-01" in " ".join(
+        done.stderr.split()
+    )
 
 
 def accuracy_end(count, n):
@@ -303,7 +354,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "1000 rpm"
     )
-    without_method = partial(verify.run_checks, names=(*verify.QUICK_CHECKS, "reference"))
+    without_method = partial(verify.run_checks, names=("half_step", "reference"))
     found = verify.check_study(study.load(written(tmp_path, text)), joints=1, make=without_method)
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)

@@ -323,8 +323,11 @@ def test_channels_are_selected_by_patterns():
     )  # fmt: skip
     with pytest.raises(InputError) as error:
         channels(
-            ["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "cross1.F at 3 mm", "input.drive at worst"]
-            + ["fork9.F_e"],
+            [
+                *["pin1.contact", "cross1.F_e", "fork1.F", "output.axial", "fork9.F_e"],
+                "cross1.F at 3 mm",
+                "input.drive at worst",
+            ],
             CARDAN,
         )
     found = {fault.place: (fault.found, fault.remedy) for fault in error.value.faults}

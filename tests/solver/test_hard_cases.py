@@ -205,7 +205,9 @@ def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> Non
         true["T_max"][1] *= 1.25
         true["status"][3:] = Status.NOT_SETTLED, Status.NEWTON_FAILED
         true["closure"][3] = 2e-4
-        verification.write([(store, Verification(4, rows, true, {"reference": Check("", {}, true)}))])
+        verification.write(
+            [(store, verification.VERIFY, Verification(4, rows, true, {"reference": Check("", {}, true)}))]
+        )
         checked = cases(View(store))
     table = checked.frame("cases")
     largest = max(worst, true["F_max"][0].max())

@@ -109,7 +109,8 @@ CHANGE = {"kind": "width", "label": "pin*.tilt_t", "step": "half", "words": "hal
 def verify(path: Path) -> None:
     with Writer.open(path) as store:
         check = verification.Check("finer Newton", {}, store.results()[1:3])
-        verification.write([(store, verification.Verification(1, np.arange(1, 3), check.results, {"newton": check}))])
+        found = verification.Verification(1, np.arange(1, 3), check.results, {"newton": check})
+        verification.write([(store, verification.VERIFY, found)])
         loads, status = np.arange(6.0).reshape(3, 2), np.ones(3, np.uint8)
         changed = what_if.Altered(CHANGE, 4, ("cross1.F", "psi"), loads, status)
         what_if.write(store, {what_if.key(CHANGE): changed})

@@ -25,7 +25,7 @@ from tolstat.campaign.verify import QUICK_CHECKS
 from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import KEPT
 from tolstat.common.errors import InputError, StoreError
-from tolstat.questions import joints as question
+from tolstat.questions import accuracy as question
 from tolstat.questions import sweep
 from tolstat.questions.causes.worst import joint_rows
 from tolstat.questions.exceedance import curves, rows
@@ -103,7 +103,7 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
     fakes.run(fake(), path, 1, 7, check=True)
     with h5py.File(path) as file:
         assert set(file["results"]) == {*COURSE, *CROSS_F, "row", "nominal"}
-        assert set(file["verify/half_step"]) == {*COURSE, *CROSS_F, "rows"}
+        assert set(file["verify/finer"]) == {*COURSE, *CROSS_F, "rows"}
     with ResultFile.open(path) as store, ResultFile.open(everything) as whole:
         found, expected = store.results(), whole.results()
         for c in RESULT_COLUMNS:
@@ -116,8 +116,8 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
         assert list(store.to_pandas().columns) == [name for name in frame.columns if name not in left_out]
         checked = verification.read(store)
         assert checked is not None
-        assert np.isnan(checked.checks["newton"].results["T_max"]).all()
-        assert np.isfinite(checked.checks["newton"].results["F_max"][:, :4]).all()
+        assert np.isnan(checked.checks["finer"].results["T_max"]).all()
+        assert np.isfinite(checked.checks["finer"].results["F_max"][:, :4]).all()
     assert path.stat().st_size < everything.stat().st_size - 60 * (layout.COLUMN_OVERHEAD // 2)
 
 

@@ -86,10 +86,14 @@ REFUSED = {
     "grade with its letter": ({"parts": 'shaft.unbalance.grade = "G16"'}, "'G16' is not a number", 'write "16 mm/s"'),
     "bearings in the wrong order": (
         {"parts": 'shaft.input.bearings = ["240 mm", "80 mm"]'},
-        "shaft.input.bearings: 240 mm, 80 mm are not two places in order",
+        "shaft.input.bearings: 240 mm, 80 mm are not in order",
         "nearer bearing first",
     ),
-    "grade without mass": ({"parts": 'shaft.unbalance.grade = "16 mm/s"'}, "needs amount, or grade", "one of the two"),
+    "grade without mass": (
+        {"parts": 'shaft.unbalance.grade = "16 mm/s"'},
+        "has grade without mass and speed",
+        "add mass",
+    ),
     "unbalance without direction": (
         {"parts": 'shaft.unbalance.amount = "1e-3 kg*m"'},
         "shaft.unbalance: has no direction",

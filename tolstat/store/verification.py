@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.columns import blank_others
+from tolstat.common.columns import Column, blank_others
 from tolstat.common.tables import tables
 from tolstat.store import layout
 from tolstat.store.hdf5 import pick, put_attributes, put_scale, text, told_as_damage
@@ -74,8 +74,6 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         return None
     again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
     with told_as_damage(store.path, "is damaged: its verification cannot be used", f"make it anew: {again}"):
-        if text(group.attrs, CHECKSUM) != _checksum(group):
-            raise ValueError("its values do not match their checksum")
         rows = np.asarray(group["rows"][:], np.intp)
         checks = {}
         for check in text(group.attrs, "checks").split():
@@ -85,8 +83,10 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
                 c.of(table)[:] = group[check][c.name][:]
             attrs = group[check].attrs
             checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-        base = pick(store.results, np.asarray(store.slot(rows)))
-        return Verification(int(group.attrs["seed"]), rows, base, checks)
+        seed = int(group.attrs["seed"])
+        if text(group.attrs, CHECKSUM) != _checksum(seed, rows, checks, store.columns):
+            raise ValueError("its values do not match their checksum")
+        return Verification(seed, rows, pick(store.results, np.asarray(store.slot(rows))), checks)
 
 
 def read_each(stores: Sequence[Reader], name: str) -> list[Verification]:
@@ -94,16 +94,14 @@ def read_each(stores: Sequence[Reader], name: str) -> list[Verification]:
     return [found for store in stores if (found := read(store, name)) is not None]
 
 
-def _checksum(group: h5py.Group) -> str:
+def _checksum(seed: int, rows: NDArray[np.intp], checks: dict[str, Check], columns: Sequence[Column]) -> str:
     """SHA-256 of the rows of a verification and of the results of its checks, names and descriptions included."""
-    digest = hashlib.sha256(np.asarray(group["rows"][:]).tobytes())
-    names = text(group.attrs, "checks")
-    digest.update(f"{group.attrs['seed']} {names}".encode())
-    for check in names.split():
-        attrs = group[check].attrs
-        digest.update(f"{check} {text(attrs, 'description')} {text(attrs, 'options')}".encode())
-        for name in sorted(group[check]):
-            digest.update(name.encode() + np.asarray(group[check][name][:]).tobytes())
+    digest = hashlib.sha256(rows.astype("i8").tobytes())
+    digest.update(f"{seed} {' '.join(checks)}".encode())
+    for name, check in checks.items():
+        digest.update(f"{name} {check.description} {json.dumps(check.options, allow_nan=False)}".encode())
+        for c in columns:
+            digest.update(c.name.encode() + c.of(check.results).astype(c.dtype).tobytes())
     return digest.hexdigest()
 
 
@@ -143,6 +141,7 @@ def write(parts: Sequence[tuple[Writer, str, Verification]]) -> None:
                 layout.create_table(group, check_name, store.columns, len(rows), [check.results], scale=rows)
                 options = json.dumps(check.options, allow_nan=False)
                 put_attributes(group[check_name], {"description": check.description, "options": options})
-            put_attributes(group, {CHECKSUM: _checksum(group)})
+            checksum = _checksum(verification.seed, verification.rows, verification.checks, store.columns)
+            put_attributes(group, {CHECKSUM: checksum})
 
     parts[0][0].replace(change)

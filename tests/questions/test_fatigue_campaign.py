@@ -321,8 +321,8 @@ def test_channels_are_selected_by_patterns():
         "output.lateral at 28.6478898 deg",
         *(f"cross{i}.T at worst" for i in (1, 2, 3, 4)),
     )  # fmt: skip
+    asked = "pin1.contact, cross1.F_e, fork1.F, output.axial, cross1.F at 3 mm, input.drive at worst, fork9.F_e"
     with pytest.raises(InputError) as error:
-        asked = "pin1.contact, cross1.F_e, fork1.F, output.axial, cross1.F at 3 mm, input.drive at worst, fork9.F_e"
         channels(asked.split(", "), CARDAN)
     found = {fault.place: (fault.found, fault.remedy) for fault in error.value.faults}
     unsigned = "has no sign: its cycles are not those of the load"

@@ -91,9 +91,7 @@ def test_the_study_of_the_file_has_its_parts(path: Path) -> None:
 def test_a_limit_at_one_point_is_compared(path: Path) -> None:
     with ResultFile.open(path) as store:
         rows = tolstat.compare(store.view(), store.view()).frame("shares").set_index("load")
-        with pytest.raises(
-            InputError, match=r"'los at fast' is not a load that both files keep\n.*did you mean 'loss'"
-        ):
+        with pytest.raises(InputError, match=r"'los at fast' is not a load .*\n.*did you mean 'loss'"):
             tolstat.compare(store.view(), store.view(), ["los at fast"])
         mu = 0.05 + store.errors()["friction.mu"][1:]
     share = np.mean(0.1 * mu * 60 * 1500 * np.pi / 30 > 47.0)

@@ -365,8 +365,7 @@ def counted_names(entry: Entry, place: str, mechanism: Mechanism) -> list[str]:
         found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
         raise input_error(where, found, _signed(unsigned[0], mechanism))
     if not selected and select(plane, loads_of(mechanism)):
-        remedy = 'write components or directions, such as cross1.F_t, input.f_x, "input.lateral at worst"'
-        raise input_error(where, "selects loads of which cycles are not counted", remedy)
+        raise input_error(where, "its cycles are not counted", 'write components, or "input.lateral at worst"')
     if not selected:
         raise input_error(where, "selects nothing", suggestion(plane, list(names)))
     if not at:

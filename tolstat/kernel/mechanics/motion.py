@@ -124,7 +124,7 @@ def to_pin(hinge, a, par, work):
 
 @njit
 def point_to_hole(hinge, point, par, work):
-    """Place of a point in a hole's member, in its axes, by its place in the pin's."""
+    """Place of `point` in a hole's member, in its axes; given in the pin's."""
     if par.hinge_axis[hinge] == GENERAL:
         return add(turn(work.into_hole, hinge, point), row(work.place, hinge))
     return to_hole(hinge, point, par, work)
@@ -132,7 +132,7 @@ def point_to_hole(hinge, point, par, work):
 
 @njit
 def point_to_pin(hinge, point, par, work):
-    """Place of a point in a pin's member, in its axes, by its place in the hole's."""
+    """Place of `point` in a pin's member, in its axes; given in the hole's."""
     if par.hinge_axis[hinge] == GENERAL:
         return turn_back(work.into_hole, hinge, sub(point, row(work.place, hinge)))
     return to_pin(hinge, point, par, work)

@@ -65,7 +65,7 @@ def place_members(theta, par, work):
 
 @njit
 def put_attitude(member, axes, par, work):
-    """Write the attitude of a member; `axes`: its axes in its parent."""
+    """Write the attitude of `member`; `axes`: its axes in its parent."""
     parent = par.parent[member]
     for j in range(3):
         axis = axes[j]

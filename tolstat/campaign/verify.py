@@ -231,16 +231,12 @@ def check(
     faults: list[Fault] = []
     with gather(faults):
         number = _parse_joints(joints)
-    if path.suffix.lower() == ".toml":
+    if is_study := path.suffix.lower() == ".toml":
         with gather(faults):
             study = load(path)
     raise_all(faults)
     make = partial(run_checks, workers=workers, progress=progress)
-    return (
-        check_study(study, number, seed, make)
-        if path.suffix.lower() == ".toml"
-        else check_file(path, number, seed, make)
-    )
+    return check_study(study, number, seed, make) if is_study else check_file(path, number, seed, make)
 
 
 def check_file(path: Path, joints: int | None, seed: int | None = None, make: Make = run_checks) -> Verification:

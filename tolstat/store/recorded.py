@@ -190,10 +190,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     except InputError as error:
         if path is not None:
             raise
-        of_study = [fault for fault in error.faults if fault.place.startswith(f"{source}: ")]
         found = "holds the text of this study; what the text names is looked for in the folder of the result file"
         remedy = "give the study file, if the command has this option: --study STUDY"
-        raise InputError([*of_study, Fault(str(store.path), found, remedy)]) from error
+        raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     study = _at_point(store, study)

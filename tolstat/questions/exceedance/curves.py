@@ -41,9 +41,8 @@ def sheet(view: View, notes: Sequence[str]) -> Figure:
         joints on a logarithmic axis down to half a joint.
     """
     title = f"{view.name}: share of joints whose largest load exceeds x"
-    return drawing.sheet(
-        [_panel(view, each) for each in load_panels(view.limits, view.mechanism)], title, notes, columns=2
-    )
+    drawn = [_panel(view, panel) for panel in load_panels(view.limits, view.mechanism)]
+    return drawing.sheet(drawn, title, notes, columns=2)
 
 
 def _panel(view: View, panel: LoadPanel) -> Panel:
@@ -57,9 +56,8 @@ def _panel(view: View, panel: LoadPanel) -> Panel:
             return
         high, _ = _draw(ax, view, loads)
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), panel.unit)
-        ax.set(
-            xlabel=f"x: largest {panel.quantity} over the revolution [{unit or '1'}]", ylabel="share of joints above x"
-        )
+        x = f"x: largest {panel.quantity} over the revolution [{unit or '1'}]"
+        ax.set(xlabel=x, ylabel="share of joints above x")
         if view.design.has_intervals:
             end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
             look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}

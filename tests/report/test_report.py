@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 from tests.support import reports, synthetic
 from tests.support.environment import ROOT
-from tests.support.views import swept, view
+from tests.support.views import at_points, swept, view
 from tolstat import joint
 from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, StoreError
@@ -106,6 +106,18 @@ def test_picture_states_study_numbers_units_and_limits():
     assert {ax.get_yscale() for ax in figure.axes} == {"log"}
 
 
+def test_pictures_show_all_loads_with_limits():
+    """Loads of one kind at the same operating points share a panel."""
+    limits = {"pin2.contact": 650.0, "psi": 1.1e-4, "pin3.contact": 650.0}
+    for draw, made in ((curves.sheet, view(limits=limits)), (sweep.sheet, swept(limits=limits))):
+        figure = draw(made, []) if draw is curves.sheet else draw(made)
+        titles = [ax.get_title("left") for ax in figure.axes]
+        assert titles[4:] == ["Contact force", "|Psi|"]
+        assert {"limit 650 N", "pin2.contact", "pin3.contact", "psi"} <= set(texts(figure))
+    one = at_points({"a": synthetic.results(21), "b": synthetic.results(21)}, {"cross1.F at b": 650.0})
+    assert [ax.get_title("left") for ax in curves.sheet(one, []).axes][4:] == ["Bushing force at b"]
+
+
 def _not_drawn(figure):
     """Labels of ticks outside of their axis, which matplotlib keeps but does not draw."""
     hidden = []
@@ -193,6 +205,17 @@ def test_sweep_table_keeps_every_joint_with_its_status():
     np.testing.assert_array_equal(table["cross1.F [N]"], made.results["F_max"][:, 0])
     short = found.tables["sweep"].for_people
     assert [row["fork.T [N*m]"] for row in short] == list(made.results["T_max"][:, 4:].max(axis=1))
+
+
+def test_sweep_table_has_the_loads_with_limits():
+    made = swept(limits={"pin2.contact": 650.0})
+    found = sweep.sweep(made)
+    np.testing.assert_array_equal(
+        found.frame("sweep")["pin2.contact [N]"], made.results["contact_max"][:, 1].max(axis=1)
+    )
+    shown = fitted(found.tables["sweep"].columns, found.tables["sweep"].for_people, 50)[0]
+    assert "pin2.contact [N]" in shown
+    assert "fork.T [N m]" not in shown
 
 
 def test_sweep_page_shows_unsettled_and_failed_joints():

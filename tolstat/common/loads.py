@@ -6,7 +6,7 @@ of the numerical error, selection of results and export read them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -185,6 +185,48 @@ def panels(mechanism: Mechanism) -> tuple[tuple[str, Kind], ...]:
     shown = [kind for kind in kinds(mechanism).values() if kind.shown]
     groups = dict.fromkeys(bushing.group for bushing in mechanism.bushings)
     return tuple((group, kind) for group in groups for kind in shown)
+
+
+class LoadPanel(NamedTuple):
+    """Loads that a figure of a whole campaign shows in one panel.
+
+    Attributes
+    ----------
+    key : str
+        ``cross-F``; of loads that limits name, ``loss at cruise``.
+    title, words : str
+        ``Cross bushings, force``; ``forces of the cross bushings``.
+    quantity : str
+        What an axis calls them.
+    unit : str
+        SI unit.
+    names : tuple of str
+        Names of the loads.
+    """
+
+    key: str
+    title: str
+    words: str
+    quantity: str
+    unit: str
+    names: tuple[str, ...]
+
+
+def load_panels(limited: Iterable[str], mechanism: Mechanism) -> list[LoadPanel]:
+    """Panels for groups of bushings, and for other loads that have limits, by kind and operating points."""
+    found, others = list[LoadPanel](), dict[tuple[str, str], list[str]]()
+    for group, kind in panels(mechanism):
+        quantity, names = QUANTITY[kind.unit], names_of(group, kind, mechanism)
+        title, words = f"{group.capitalize()} bushings, {quantity}", f"{quantity}s of the {group} bushings"
+        found.append(LoadPanel(f"{group}-{kind.symbol}", title, words, f"|{kind.symbol}|", kind.unit, names))
+    for name in limited:
+        if name not in shown_loads(mechanism):
+            others.setdefault((load_of(name, mechanism).kind.key, split(name)[1]), []).append(name)
+    for (key, points), limited_names in others.items():
+        kind, where = kinds(mechanism)[key], f"{AT}{points}" if points else ""
+        title, words = f"{kind.noun[:1].upper()}{kind.noun[1:]}{where}", f"{kind.noun}{where}"
+        found.append(LoadPanel(f"{key}{where}", title, words, kind.noun, kind.unit, tuple(limited_names)))
+    return found
 
 
 def unit_text(unit: str) -> str:

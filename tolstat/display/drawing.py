@@ -111,7 +111,9 @@ def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), c
     with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
-        for panel, ax in zip(panels, axes.flat, strict=True):
+        for ax in axes.flat[len(panels) :]:
+            ax.remove()
+        for panel, ax in zip(panels, axes.flat[: len(panels)], strict=True):
             top = _draw(ax, panel)
             pad = 6.0 if panel.bare else 72.0 * top
             ax.set_title("\n".join(wrap(panel.title, 62)), fontsize=10, fontweight="normal", pad=pad)

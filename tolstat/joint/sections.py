@@ -44,9 +44,7 @@ def _friction(mu: float) -> float:
 
 def _grade(grade: float) -> float:
     if grade > LARGEST_GRADE:
-        raise refuse(
-            "{grade} is above G 4000, the largest grade", 'write the number of the grade in mm/s, "16 mm/s"', "grade"
-        )
+        raise refuse("{grade} is above G 4000, the largest grade", 'write its number in mm/s: "16 mm/s"', "grade")
     return grade
 
 

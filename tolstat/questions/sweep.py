@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.campaign.remedy import remedy
 from tolstat.common.columns import holds
-from tolstat.common.load_kinds import Kind, kinds
-from tolstat.common.loads import QUANTITY, FloatArray, load_of, loads_of, names_of, panels, unit_text
+from tolstat.common.load_kinds import kinds
+from tolstat.common.loads import FloatArray, LoadPanel, load_of, load_panels, names_of, panels, unit_text
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import read_section
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status, tables
@@ -46,7 +46,8 @@ def sweep(view: View) -> Answer:
     Answer
         Table ``sweep``: one row per joint, pending and failed ones included, with the swept values, headed by label and
         unit for the reader (``pin*.diameter [mm]``); ``status``; force and torque of each bushing, SI, headed likewise;
-        ``psi``. Loads that the study does not keep are left out. Pictures of the loads against the first swept value.
+        ``psi``; other loads with limits. Loads that the study does not keep are left out. Pictures of the loads against
+        the first swept value.
 
     Raises
     ------
@@ -57,23 +58,22 @@ def sweep(view: View) -> Answer:
         raise inapplicable(view, "holds no sweep", "give the result file of a study with [sweep]")
     columns: dict[str, Sequence[object]] = {axis.head: axis.values.tolist() for axis in swept_axes(view)}
     columns["status"] = [Status(int(code)).label for code in view.status]
-    names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
-    columns |= {_head(name, loads_of(view.mechanism)[name].unit): view.simulated(name).tolist() for name in names}
+    names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi"), *view.limits])
+    heads = {name: _head(name, load_of(name, view.mechanism).unit) for name in names}
+    columns |= {head: view.simulated(name).tolist() for name, head in heads.items()}
     rows = rows_of(columns)
     seen = [_short(row, view.mechanism) for row in rows]
-    ranked = [name for name in (seen[0] if seen else ()) if "." in name][1:]
+    limited = [heads[name] for name in view.limits]
+    ranked = [name for name in (seen[0] if seen else ()) if "." in name and name not in limited][1:]
     table = Table("sweep", "Worst bushing", plain(seen, ranked), rows, seen=seen)
-    pictures: list[Part] = []
-    if view.bushing_loads:
-        drawn = [_panel(view, group, kind) for group, kind in panels(view.mechanism) if _kept(view, group, kind)]
-        pictures = [Panels(drawn), Sheet("sweep", partial(sheet, view))]
+    drawn = [_panel(view, panel) for panel in load_panels(view.limits, view.mechanism) if _kept(view, panel)]
+    pictures: list[Part] = [Panels(drawn), Sheet("sweep", partial(sheet, view))] if drawn else []
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
 
 
-def _kept(view: View, group: str, kind: Kind) -> dict[str, FloatArray]:
-    """Largest loads of one kind at the bushings of a group that the study keeps, (n,) each."""
-    names = names_of(group, kind, view.mechanism)
-    return {name: view.simulated(name) for name in names if name in view.bushing_loads}
+def _kept(view: View, panel: LoadPanel) -> dict[str, FloatArray]:
+    """Largest loads of a panel that the study keeps, (n,) each."""
+    return {x: view.simulated(x) for x in panel.names if x in (*view.bushing_loads, *view.limits)}
 
 
 def _head(name: str, unit: str) -> str:
@@ -90,12 +90,10 @@ def _short(row: Row, mechanism: Mechanism) -> Row:
     return short
 
 
-def _panel(view: View, group: str, kind: Kind) -> Panel:
-    axes = swept_axes(view)
-    quantity, draw = QUANTITY[kind.unit], partial(_draw, view=view, axes=axes, group=group, kind=kind)
-    title, words = f"{group.capitalize()} bushings, {quantity}", f"Largest {quantity}s of the {group} bushings"
-    words += " against the swept value"
-    return Panel(f"sweep-{group}-{kind.symbol}", title, words, draw, (drawing.WIDTH, 3.8))
+def _panel(view: View, panel: LoadPanel) -> Panel:
+    draw = partial(_draw, view=view, axes=swept_axes(view), panel=panel)
+    words = f"Largest {panel.words} against the swept value"
+    return Panel(f"sweep-{panel.key}", panel.title, words, draw, (drawing.WIDTH, 3.8))
 
 
 def sheet(view: View) -> Figure:
@@ -112,8 +110,8 @@ def sheet(view: View) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group and kind; joints that did not settle are hollow, those without a result are crosses at
-        the foot.
+        A panel for each group and kind, and for other loads with limits; joints that did not settle are hollow, those
+        without a result are crosses at the foot.
     """
     axes, small = swept_axes(view), "largest modulus over the last revolution of each joint"
     if len(axes) > 1:
@@ -123,23 +121,24 @@ def sheet(view: View) -> Figure:
     if len(axes) > 2:
         small += f"; one line for each {', '.join(axis.label for axis in axes[2:])}"
     title = f"{view.name}: largest loads against {axes[0].label if axes else 'the number of the joint'}"
-    drawn = [_panel(view, *panel) for panel in panels(view.mechanism)]
+    drawn = [_panel(view, panel) for panel in load_panels(view.limits, view.mechanism)]
     return drawing.sheet(drawn, title, [view.head(), small], columns=2)
 
 
-def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
-    """Draw the loads of one kind at the bushings of a group."""
+def _draw(ax: Axes, view: View, axes: list[Axis], panel: LoadPanel) -> None:
+    """Draw the loads of a panel."""
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
-    ax.set(xlabel=first.head, ylabel=f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
+    ax.set(xlabel=first.head, ylabel=f"largest {panel.quantity} [{unit_text(panel.unit) or '1'}]")
     ax.xaxis.set_major_locator(style.ticker.MaxNLocator(6))
-    loads = _kept(view, group, kind)
+    loads = _kept(view, panel)
     if not loads:
         drawing.empty(ax, "not kept by the study")
         return
     if len(axes) < 2:
-        for i, name in enumerate(names_of(group, kind, view.mechanism)):
+        for i, name in enumerate(panel.names):
             if name in loads:
-                bushing = load_of(name, view.mechanism).place.name.replace(group, "bushing ")
+                place = load_of(name, view.mechanism).place
+                bushing = place.name.replace(place.group, "bushing ") if name in view.bushing_loads else name
                 _line(ax, view, first, loads[name], np.arange(view.n), **style.curve(i), label=bushing)
     else:
         largest, others = np.max(list(loads.values()), axis=0), np.column_stack([axis.values for axis in axes[1:]])
@@ -157,7 +156,7 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
     bottom, top = ax.get_ylim()
     for limit in sorted({view.limits[name] for name in loads if name in view.limits}):
         if limit < top + 0.5 * (top - bottom):
-            label = f"limit {text.value(limit, kind.unit)}"
+            label = f"limit {text.value(limit, panel.unit)}"
             ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)), label=label)
 
 

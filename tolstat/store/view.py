@@ -211,8 +211,9 @@ class View:
 
     def simulated(self, name: str) -> FloatArray:
         """Largest load of each joint that has results, those of unsettled joints included, SI; NaN without, (n,)."""
-        load = loads_of(self.mechanism)[name]
-        return np.asarray(np.maximum.reduce([load.of(part.results) for part in self.parts]))
+        view, plain = self.narrowed(name)
+        load = loads_of(self.mechanism)[plain]
+        return np.asarray(np.maximum.reduce([load.of(part.results) for part in view.parts]))
 
     def loads(self, names: Sequence[str]) -> list[Sample]:
         """Several loads; see `load`."""

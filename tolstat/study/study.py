@@ -148,17 +148,14 @@ class Study:
     def _negative_friction(self) -> Iterator[tuple[KeyPath, str, str]]:
         """Deviations that take the friction of a joint below zero, as `points.refusals` yields what it refuses."""
         mu = min((joint.friction.mu for joint in self.joints if joint.friction.mu is not None), default=math.inf)
-        key, listed = MU.split("."), self.listed
-        given: list[tuple[KeyPath, float]] = [(("errors", *key), self.errors.get(MU, 0.0))]
-        for number, errors in enumerate(listed.cases.values() if listed else ()):
-            given.append((("case", number - 1, "errors", *key), errors.get(MU, 0.0)))
-        given.append(
-            (("grid", *key), min((point.get(MU, 0.0) for point in (listed.points if listed else ())), default=0.0))
-        )
-        for site, model in (both for entry in self.entries for both in entry.models):
-            if site.name == MU and isinstance(model, SingleEntry):
-                given.append((("tolerances", *key), model.least(site)))
-        for path, least in given:
+        key = MU.split(".")
+        cases, grid = (self.listed.cases, self.listed.points) if self.listed else ({}, ())
+        given: dict[KeyPath, float] = {("errors", *key): self.errors.get(MU, 0.0)}
+        given |= {("case", n - 1, "errors", *key): each.get(MU, 0.0) for n, each in enumerate(cases.values())}
+        given["grid", *key] = min((point.get(MU, 0.0) for point in grid), default=0.0)
+        models = [both for entry in self.entries for both in entry.models if both[0].name == MU]
+        given |= {("tolerances", *key): model.least(site) for site, model in models if isinstance(model, SingleEntry)}
+        for path, least in given.items():
             if mu + least < 0.0:
                 found = f"takes friction.mu = {mu:g} of the joint down to {mu + least:.3g}, below zero"
                 yield path, found, f"give no deviation below {-mu:g}"

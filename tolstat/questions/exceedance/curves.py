@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.sample import Sample
-from tolstat.common.load_kinds import Kind
-from tolstat.common.loads import QUANTITY, load_of, names_of, panels
+from tolstat.common.loads import LoadPanel, load_of, load_panels, panels
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
 from tolstat.display.style import lines, ticker
@@ -26,7 +25,7 @@ LIMIT_DASH = (0.0, (8.0, 3.0))
 
 
 def sheet(view: View, notes: Sequence[str]) -> Figure:
-    """Draw the exceedance curves of all bushing loads that the study keeps.
+    """Draw the exceedance curves of all bushing loads that the study keeps, and of all loads with limits.
 
     Parameters
     ----------
@@ -38,17 +37,17 @@ def sheet(view: View, notes: Sequence[str]) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group and kind, empty where no load is kept; share of the joints on a logarithmic axis down to
-        half a joint.
+        A panel for each group and kind, empty where no load is kept, and for other loads with limits; share of the
+        joints on a logarithmic axis down to half a joint.
     """
     title = f"{view.name}: share of joints whose largest load exceeds x"
-    return drawing.sheet([_group_panel(view, *panel) for panel in panels(view.mechanism)], title, notes, columns=2)
+    drawn = [_panel(view, panel) for panel in load_panels(view.limits, view.mechanism)]
+    return drawing.sheet(drawn, title, notes, columns=2)
 
 
-def _group_panel(view: View, group: str, kind: Kind) -> Panel:
-    """Curves of one kind of loads at the bushings of a group."""
-    names = names_of(group, kind, view.mechanism)
-    samples = {i: view.load(x) for i, x in enumerate(names) if x in view.bushing_loads}
+def _panel(view: View, panel: LoadPanel) -> Panel:
+    """Curves of loads of one kind."""
+    samples = {i: view.load(x) for i, x in enumerate(panel.names) if x in (*view.bushing_loads, *view.limits)}
     loads = {i: load for i, load in samples.items() if load.valid.size}
 
     def draw(ax: Axes) -> None:
@@ -56,16 +55,16 @@ def _group_panel(view: View, group: str, kind: Kind) -> Panel:
             drawing.empty(ax, "no joint with a valid result" if samples else "not kept by the study")
             return
         high, _ = _draw(ax, view, loads)
-        unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit)
-        ax.set(xlabel=f"x: largest |{kind.symbol}| over the revolution [{unit}]", ylabel="share of joints above x")
+        unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), panel.unit)
+        x = f"x: largest {panel.quantity} over the revolution [{unit or '1'}]"
+        ax.set(xlabel=x, ylabel="share of joints above x")
         if view.design.has_intervals:
             end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
             look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
             ax.axhline(end, **look, label="upper end where none exceeds x")
 
-    title = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}"
-    height = 3.9 + 0.2 * max(len(names) - 4, 0)  # a line of the legend for each
-    return Panel(f"exceedance-{group}-{kind.symbol}", title, title, draw, (drawing.WIDTH, height))
+    height = 3.9 + 0.2 * max(len(panel.names) - 4, 0)  # a line of the legend for each
+    return Panel(f"exceedance-{panel.key}", panel.title, panel.title, draw, (drawing.WIDTH, height))
 
 
 def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
-from tolstat.study.design import Design, sobol
+from tolstat.study.design import KEYS, Design, sobol
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.zone_laws import plane_scores
 
@@ -200,7 +200,7 @@ def _fill_grid(samples: Table, study: Study, numbers: range) -> None:
     """Set the points of the product grid of the axes, the last of which varies fastest; dimensions are no errors."""
     index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in study.sweep])
     for axis, at in zip(study.sweep, index, strict=True):
-        for name in set(axis.names).intersection(samples.dtype.names or ()):
+        for name in set(axis.names).intersection(samples.dtype.names or ()).difference(KEYS):
             samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at] - _nominal(study.operation, name)
 
 

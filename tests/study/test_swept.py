@@ -13,6 +13,7 @@ from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
+from tolstat.joint.perturbation import perturb
 from tolstat.questions.sweep import swept_axes
 from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study import design
@@ -70,6 +71,17 @@ def test_a_row_has_the_dimensions_and_errors_of_its_point(tmp_path: Path) -> Non
         expected = np.tile(np.repeat(np.linspace(-2e-5, 2e-5, 5), 2), 3)
         np.testing.assert_allclose(errors[pin], np.concatenate([[0.0], expected]), atol=1e-20)
     np.testing.assert_allclose(errors["pin1.tilt_z"][1:], np.radians(0.1))
+
+
+def test_keys_that_are_errors_too_are_swept_as_values_of_the_joint(tmp_path: Path) -> None:
+    axes = '[sweep]\n"friction.mu" = { from = 0.0, to = 0.1, points = 3 }\n'
+    axes += '"thrust.end_play" = { from = "0 mm", to = "0.1 mm", points = 2 }\n'
+    s = load(tmp_path, ('base = "cirelli2021"', 'base = "pin25"'), (TEXT[TEXT.index("[sweep]") :], axes))
+    drawn = sampling.draw(s)
+    made = [perturb(joint, s.operation, drawn[i : i + 1]) for i, joint in enumerate(s.joints)]
+    assert [row["mu"][0] for row in made] == pytest.approx([0.004, 0.0, 0.0, 0.05, 0.05, 0.1, 0.1])
+    assert [joint.thrust.end_play for joint in s.joints if joint.thrust] == pytest.approx([2e-5, *(0.0, 1e-4) * 3])
+    assert not drawn["thrust.end_play"].any()
 
 
 def test_without_the_nominal_joint(tmp_path: Path) -> None:

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue import loads as fatigue
     from tolstat.report import answer as reports
     from tolstat.report import page
-    from tolstat.solver import compilation
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
     from tolstat.study import assumptions, points, rewriting, starter
     from tolstat.study import schema as schemas
@@ -45,8 +44,8 @@ else:
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
     joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
-    names = ("report.answer", "report.page", "solver.compilation")
-    reports, page, compilation = (Late(f"tolstat.{name}") for name in names)
+    names = ("report.answer", "report.page")
+    reports, page = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
     names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")

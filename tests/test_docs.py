@@ -182,6 +182,8 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
         study = made / f"{name}.toml"
         study.write_text("[[variant]]".join([head, *variants[:1]]), encoding="utf-8")
         tolstat.run(tolstat.load(study), made / f"{name}.h5", workers=1, check=False)
+    rings = tolstat.load(made / "studies" / "snap_rings.toml", n=8)
+    tolstat.run(rings, made / "snap_rings.h5", workers=1, check=False)
     return made
 
 

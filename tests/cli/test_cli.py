@@ -259,7 +259,6 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
     with ResultFile.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
-    monkeypatch.setattr("tolstat.solver.compilation.announce", lambda *_: None)  # where no kernel is compiled yet
     first, exact, *told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
     assert first == "small: shafts rigid along their axes; contact law mode"
     assert exact.startswith("no tolerance, taken as exact: pin positions along e and z, pin angles")

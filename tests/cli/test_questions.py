@@ -123,7 +123,6 @@ def test_a_study_is_simulated_whole_and_read_at_the_point_asked_for(
 
     question = Question("known", "Read", "Know it.")
     monkeypatch.setattr(Question, "functions", lambda self: (known, simulate))
-    monkeypatch.setattr("tolstat.solver.compilation.announce", lambda: None)
     given = {"source": tmp_path / "two.toml", "point": point or None, "workers": None, "out": None, "wide": False}
     run = _command.function_of(question)
     if shown is None:

@@ -15,7 +15,7 @@ from tolstat import joint
 from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.common.cardan import CARDAN
 from tolstat.common.columns import result_columns
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import Mode, Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence, Table
@@ -354,7 +354,12 @@ def test_a_bearing_for_the_contact_alone_has_no_life():
     with pytest.raises(StoreError, match="bearings without C, needle_diameter, which a rating life needs") as caught:
         lives_of(made)
     assert "no joint is simulated again" in str(caught.value)
-    with pytest.raises(StoreError, match="C, needle_diameter"):
+    with pytest.raises(StoreError, match="C, needle_diameter") as caught:
+        question.bearing_life_on_page(made, Asked(Path(made.path)))
+    assert not isinstance(caught.value, NotApplicable)  # a life is required: the page says what lacks
+    del bearing["required_life"]
+    made = views.view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
+    with pytest.raises(NotApplicable, match="needle bearings without C"):
         question.bearing_life_on_page(made, Asked(Path(made.path)))
 
 

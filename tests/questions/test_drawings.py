@@ -187,6 +187,16 @@ def test_sizes_are_written_beside_the_drawing(cirelli):
     assert f"α = {np.degrees(ALPHA):.4g}°" in words[1]
 
 
+def test_the_table_has_what_a_joint_has_beside(cirelli):
+    keys = {"input": {"bearings": ["70 mm", "190 mm"]}, "unbalance": {"amount": "400 g*mm", "angle": "0 deg"}}
+    joint = joints.load("pin25", {"shaft": keys}, "x.toml")
+    values = {row["dimension"]: row["value"] for row in answer.lengths(joint, [ALPHA])}
+    expected = {"thrust.end_play": "0.02 mm", "friction.mu": "0.004", "shaft.input.bearings": "70, 190 mm"}
+    assert (expected | {"shaft.unbalance": "400 g*mm"}).items() <= values.items()
+    of_paper = {row["dimension"] for row in answer.lengths(cirelli, [ALPHA])}
+    assert not of_paper & (expected.keys() | {"shaft.output.bearings", "shaft.unbalance"})
+
+
 @pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])
 @pytest.mark.parametrize("over", [{}, SLIM, SHORT], ids=["paper", "slim", "short"])
 def test_labels_are_inside_and_apart(over, alpha):

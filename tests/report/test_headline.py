@@ -238,7 +238,6 @@ def test_run_and_plan_tell_before_that_shares_will_have_no_interval(tmp_path, mo
     source.write_text(study(64, method), encoding="utf-8")
     monkeypatch.setattr("tolstat.cli.run.simulate", lambda *given, **choices: None)
     monkeypatch.setattr("tolstat.cli.run.conclude", lambda *given: None)
-    monkeypatch.setattr("tolstat.solver.compilation.announce", lambda: None)
     monkeypatch.setattr("tolstat.campaign.plan.plan", lambda *given: 1 / 0)
     for command in ("run", "plan"):
         done = CliRunner().invoke(app, [command, str(source), "--quiet"])

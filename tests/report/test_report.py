@@ -315,3 +315,6 @@ def test_values_of_the_joint_that_differ_from_the_one_that_comes_along():
     assert rows["contact.D_P"][:2] == ["76.1 mm", "76 mm"]
     assert rows["contact.k1p"][2] == DERIVED["contact.k1p"].formula
     assert "pin.d" not in rows
+    file.joint = joint.load("pin25", {}, "x").given("json")
+    (radius,) = [line.split() for line in joint_values(file).text.splitlines() if line.startswith("friction.radius")]
+    assert radius[1:4] == ["12.5", "mm", "-"]  # the other joint has a radius in its file, but no friction

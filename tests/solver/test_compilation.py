@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import subprocess
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
+from numba.core import config
 
-from tolstat.common.cardan import CARDAN
+from tolstat.common.cardan import CARDAN, MECHANISMS
+from tolstat.common.parameters import mark_of
 from tolstat.common.tables import Fidelity, Options
+from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY
 from tolstat.solver import compilation
 
 
@@ -72,3 +76,34 @@ def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPat
     compilation.warm_up(Options())
     assert "wait" not in calls
     assert set(calls) == {name for name in compilation.KERNELS if not name.startswith(("explicit.", "ideal."))}
+
+
+def test_code_of_another_mechanism_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tolstat.kernel.simd.cache_folder.CACHE_DIRECTORY", tmp_path)
+    faces = MECHANISMS["cardan+thrust"]
+    assert compilation.missing(Options()) == compilation.kernels(Options())
+    for name in compilation.kernels(Options()):
+        types = "" if name == "rainflow.count_joint" else mark_of(CARDAN)
+        (tmp_path / f"{name}-1.py311.abc.nbc").write_bytes(b"checksum" + types.encode() + bytes(20000))
+    assert compilation.is_compiled()
+    assert compilation.missing(Options(), mechanism=faces) == compilation.kernels(Options())[:-1]
+    assert compilation.stage_name() == "loading the kernels"
+    assert compilation.stage_name(faces).startswith("compiling the kernels")
+
+
+def test_types_of_arguments_are_in_the_head_of_compiled_code(params: Any) -> None:
+    """What `missing` reads: it sees that the kernels of a simulated joint are in the cache."""
+    if not config.DISABLE_JIT:
+        compilation.warm_up(Options(), params())
+        assert compilation.is_compiled(Options(), params())
+        heads = [path.read_bytes()[: compilation.HEAD] for path in CACHE_DIRECTORY.rglob("lockstep.*.nbc")]
+        assert all(b"numbers_" in head for head in heads)
+
+
+def test_compilation_is_told_once(calls: list[str], monkeypatch: pytest.MonkeyPatch, caplog: Any) -> None:
+    caplog.set_level("INFO", logger="tolstat")
+    compilation.warm_up()
+    assert [record.message[:21] for record in caplog.records] == ["compiling the kernels"]
+    monkeypatch.setattr(compilation, "missing", lambda *_: [])
+    compilation.warm_up()
+    assert len(caplog.records) == 1

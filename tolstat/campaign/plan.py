@@ -221,7 +221,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     Plan
     """
     workers = workers or available_cores()
-    stage(stage_name())
+    stage(stage_name(study.mechanism))
     warm_up(mechanism=study.mechanism)
     stage("pilot")
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}

@@ -197,7 +197,7 @@ def run(
         last = store.n if until_row is None else store.slot(until_row)
         try:
             if next(store.pending_blocks(last), None) is not None:
-                stage(stage_name())
+                stage(stage_name(study.mechanism))
                 compile_for(study, store)
                 store.begin_session(counts.done)
             stage(JOINTS)

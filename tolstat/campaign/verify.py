@@ -29,7 +29,6 @@ from tolstat.common.loads import load_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
-from tolstat.solver import compilation
 from tolstat.solver.reference import reference_rows
 from tolstat.store import Reader, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
@@ -267,7 +266,6 @@ def check_file(path: Path, joints: int | None, seed: int | None = None, make: Ma
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((at_point.status() == Status.OK).any() for at_point in store.each()):
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
-        compilation.announce()
         for at_point in store.each():
             if verified := check_campaign(at_point, joints, seed, make):
                 verification.write([(at_point, verification.VERIFY, verified)])
@@ -318,7 +316,6 @@ def check_near(
         if fewest < LEAST_NEAR:
             found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
             raise store_error(path, found, f"add joints: tolstat extend {path}")
-        compilation.announce()
         for at_point, slots in slots_of:
             before = verification.read(at_point, verification.NEAR)
             new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
@@ -352,7 +349,6 @@ def check_study(
     if study.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
         raise InputError([study.fault("solver.fidelity", found, remedy)])
-    compilation.announce()
     seed = study.sampling.seed if seed is None else seed
     rows = choose(np.arange(0 if joints is None else study.first_sample, study.rows), joints, seed)
     errors = draw(study)[rows]

@@ -19,7 +19,6 @@ from tolstat import __version__
 from tolstat.cli._library import (
     answers,
     assumptions,
-    compilation,
     design,
     points,
     pool,
@@ -225,7 +224,6 @@ def work(**settings: Any) -> Iterator[works.Work]:
 
     A simulation that is stopped, or loses its workers, says how far it came and ends with the exit code of that.
     """
-    compilation.announce()
     try:
         with progress() as shown:
             yield works.Work(display=shown, tell=say, **settings)

@@ -328,8 +328,6 @@ def _page(file: Path, out: Path, accepted: float, again: int | None, point: str,
             again = library.page.REPLAYED if has_histories or done else 0
             if not again:
                 say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
-        if again and view.method in library.columns.DRAWN and not has_histories:
-            library.compilation.announce()
         with progress("page") as shown:
             library.page.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)
     say(f"wrote {out}")

@@ -44,7 +44,6 @@ def plan(
     print_study_notes(study_file, loaded)
     if note := library.points.note_on_pins(loaded.tolerances, loaded.mechanism):
         say(f"note: {note}")
-    library.compilation.announce()
     with progress() as shown:
         prediction = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)
     if as_json:

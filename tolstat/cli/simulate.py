@@ -35,7 +35,6 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     loaded = library.studies.load_case(case)
     print_warnings(case, [loaded.joint])
     say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
-    library.compilation.announce()
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
     _deliver(result, {}, out, as_json)
@@ -64,7 +63,6 @@ def replay(
     point : str, optional
         Operating point, such as cruise; needed if FILE has several.
     """
-    library.compilation.announce()
     with progress("simulation"), library.stores.ResultFile.open(file) as store:
         again = library.replays.replay(store.at(point) if point else store, row)
     facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}

@@ -131,6 +131,8 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
     notes.insert(0, changes.words(view.study, asked.text))
     if view.method != "random" or view.store.sampling.get("joints_per_lot", 1) > 1:
         notes.append("joints are drawn independently here: without lots, Sobol' points or a Latin hypercube")
+    if len(view.limits) > len(loads):
+        notes.append("largest loads: of each kind the one whose limit most joints exceed")
     if not facts["settled"]:
         notes.append("the difference is not settled: a larger --most or a longer --budget goes on")
     documents = shares.study_documents(view.study, asked.text)

@@ -94,8 +94,10 @@ def orders(view: View, orbits: bool = False) -> Answer:
     """Estimate the orders of the loads that the shafts carry.
 
     Gives the amplitudes of lateral force, bending moment, driving torque and speed error at one to four times the
-    input speed: of the nominal joint, and their 5, 50 and 95 % quantiles over the joints with 95 % intervals. With
-    --orbits also the orbits of the lateral forces in axes that do not turn. --out writes pictures of them.
+    input speed: of the nominal joint, and their 5, 50 and 95 % quantiles over the joints with 95 % intervals. Of
+    bearings of shafts also the equivalent loads over the duty cycle, with exponents 3 and 10/3; without shares of the
+    operating points those at each. With --orbits also the orbits of the lateral forces in axes that do not turn. --out
+    writes pictures of them.
 
     Example: tolstat orders iso2768_f.h5 --orbits --out orders
 
@@ -140,7 +142,8 @@ def orders(view: View, orbits: bool = False) -> Answer:
     parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
     bearings = _bearings(view)
     if bearings:
-        parts.append(Table("bearings", "Equivalent loads of the shafts' bearings", BEARING_COLUMNS, bearings))
+        over = "at each operating point" if any(AT in row["load"] for row in bearings) else "over the duty cycle"
+        parts.append(Table("bearings", f"Equivalent loads of the shafts' bearings {over}", BEARING_COLUMNS, bearings))
     notes = [f"{joints} joints, {facts['left_out']} without a valid load left out"]
     if has("q95_lower")(rows):
         notes[0] += "; 95 % intervals"

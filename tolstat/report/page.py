@@ -144,7 +144,7 @@ def sections_of(view: View, asked: Asked) -> Iterator[Section]:
     for question in QUESTIONS:
         if question.page:
             asked.stage(f"page: {question.name}")
-            with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
+            with asked.noting(f"{question.name.replace('_', ' ')} is left out"), suppress(NotApplicable):
                 answer = question.on_page(view, asked)
                 blocks = [_without_folder(block, view.path) for block in answer.blocks()]
                 yield Section(question.name.replace("_", "-"), answer.title, blocks, question.page == "folded")
@@ -236,7 +236,8 @@ def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
     values: dict[str, str] = {}
     units_of = derived.UNITS | quantities(Joint) | {f"shaft.{end}.bearings": "m" for end in ("input", "output")}
-    for key, value in leaves(joint.model_dump(exclude=set(model.TOLD))).items():
+    left_out = {*model.TOLD} if "friction" in joint.parts else {*model.TOLD, "friction"}
+    for key, value in leaves(joint.model_dump(exclude=left_out)).items():
         if isinstance(value, (float, list)):
             unit = units_of.get(key, "1")
             like = examples().get(key, units.EXAMPLES[unit])

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,13 @@ from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import load_histories
 from tolstat.common.cores import available_cores
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.parameters import mark_of
 from tolstat.common.tables import Fidelity, Options, blank_params
 from tolstat.solver import histories, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
-
-
-def announce() -> None:
-    """Tell that kernels will be compiled, if they have to be."""
-    if not is_compiled():
-        LOG.info("compiling the kernels: about half a minute, once per machine and version")
+HEAD = 16384
+"""Bytes of a file with compiled code in which the types of the kernel's arguments are."""
 
 
 def _outside_model(mechanism: Mechanism, torque_reverses: bool = False) -> NDArray[np.void]:
@@ -91,10 +89,20 @@ def kernels(options: Options, params: NDArray[np.void] | None = None, mechanism:
 
 
 def missing(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
-    """Names of those that are not in the cache, for any mechanism."""
+    """Names of those that are not in the cache for a mechanism."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
-    return [name for name in kernels(options, params, mechanism) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
+    def is_there(name: str) -> bool:
+        return any(_is_for(mechanism, path) for path in CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))
+
+    return [name for name in kernels(options, params, mechanism) if not is_there(name)]
+
+
+def _is_for(mechanism: Mechanism, path: Path) -> bool:
+    """Whether compiled code is for a mechanism: PARAM has its mark, or is not among the types of the arguments."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    return mark_of(mechanism).encode() in head or b"numbers_" not in head
 
 
 def is_compiled(
@@ -110,6 +118,8 @@ def warm_up(
     """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()
     names = missing(options, params, mechanism)
+    if names:
+        LOG.info("compiling the kernels of such joints: half a minute to some minutes, once per machine and version")
     second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
     with _compiling(second, options, mechanism):
         compile_kernels([name for name in names if name not in second], options, mechanism)
@@ -139,6 +149,8 @@ def _compiling(names: list[str], options: Options, mechanism: Mechanism) -> Iter
             second.kill()
 
 
-def stage_name() -> str:
+def stage_name(mechanism: Mechanism = CARDAN) -> str:
     """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
-    return "loading the kernels" if is_compiled() else "compiling the kernels, about half a minute, once"
+    return (
+        "loading the kernels" if is_compiled(mechanism=mechanism) else "compiling the kernels, up to some minutes, once"
+    )

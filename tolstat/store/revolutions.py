@@ -13,7 +13,6 @@ from tolstat.common.channels import BUSHING_LOADS, LoadHistory, channels, follow
 from tolstat.common.cores import Forked, begun, in_order
 from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
-from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.histories import restore
 from tolstat.solver.simulation import simulate_rows
@@ -212,7 +211,6 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     """Simulate joints again with what the file holds of them, and compare with its results."""
     first, steps = int(slots[0]), int(store.options["steps_per_rev"])
     params = perturb(joint_of(store, first), operation_of(store, first), pick(store.errors, slots))
-    compilation.announce()
     histories = load_histories(store.mechanism).values()
     largest = [f"{kind.key}_max" for kind in followed(store.mechanism) if not kind.measure]
     attempts, stored = pick(store.attempt, slots), pick(store.results, slots)[largest].copy()

@@ -194,8 +194,9 @@ def _bearing(view: View) -> Bearing:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
         raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
-        incomplete = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
-        raise unusable(view, incomplete, f"add to [bearing] of the joint, {again}")
+        incomplete = f"holds needle bearings without {', '.join(lacking)}, which a rating life needs"
+        error = inapplicable if bearing.C is None and bearing.required_life is None else unusable
+        raise error(view, incomplete, f"add to [bearing] of the joint, {again}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(kinds(view.mechanism)["contact"].places):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)

@@ -309,7 +309,7 @@ def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
 
 
 def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
-    """Dimensions on the drawing: ``dimension``, ``value`` with its unit, ``meaning``."""
+    """Dimensions of a joint, and what else it has: ``dimension``, ``value`` with its unit, ``meaning``."""
     arm, contact = joint.arm, joint.contact
     rows = [
         ("cross.R", joint.cross.R, "centre of the joint to the middle of pin and hole"),
@@ -328,6 +328,22 @@ def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
     shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
     for key, alpha in zip(("operation.alpha", "series.alpha"), alphas, strict=False):
         shown.append((key, f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
+    if joint.thrust is not None:
+        shown.append(
+            ("thrust.end_play", f"{1e3 * joint.thrust.end_play:.5g} mm", "play of the cross between its faces")
+        )
+    if joint.friction.mu is not None:
+        shown.append(("friction.mu", f"{joint.friction.mu:.5g}", "coefficient of friction of the pins"))
+    for end, borne in (("input", joint.shaft.input), ("output", joint.shaft.output)):
+        if borne is not None:
+            places = ", ".join(f"{1e3 * place:.5g}" for place in borne.bearings)
+            shown.append(
+                (f"shaft.{end}.bearings", f"{places} mm", f"bearings of the {end} shaft from the joint's centre")
+            )
+    if joint.shaft.unbalance is not None:
+        shown.append(
+            ("shaft.unbalance", f"{1e6 * joint.shaft.unbalance.size:.5g} g*mm", "unbalance of the output shaft")
+        )
     return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in shown]
 
 

@@ -119,7 +119,7 @@ def warm_up(
     options = options or Options()
     names = missing(options, params, mechanism)
     if names:
-        LOG.info("compiling the kernels of such joints: half a minute to some minutes, once per machine and version")
+        LOG.info("compiling the kernels of such joints, once per machine and version: minutes")
     second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
     with _compiling(second, options, mechanism):
         compile_kernels([name for name in names if name not in second], options, mechanism)

@@ -119,7 +119,7 @@ def warm_up(
     options = options or Options()
     names = missing(options, params, mechanism)
     if names:
-        LOG.info("compiling the kernels of such joints, once per machine and version: minutes")
+        LOG.info("compiling the kernels of this study, up to some minutes, once per version")
     second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
     with _compiling(second, options, mechanism):
         compile_kernels([name for name in names if name not in second], options, mechanism)
@@ -151,6 +151,5 @@ def _compiling(names: list[str], options: Options, mechanism: Mechanism) -> Iter
 
 def stage_name(mechanism: Mechanism = CARDAN) -> str:
     """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
-    return (
-        "loading the kernels" if is_compiled(mechanism=mechanism) else "compiling the kernels, up to some minutes, once"
-    )
+    compiled = is_compiled(mechanism=mechanism)
+    return "loading the kernels" if compiled else "compiling the kernels, up to some minutes, once"

@@ -260,7 +260,7 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     for note in study.signals:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
-    command = points.with_free_shaft(str(path), path.stem, study.joint, study.mechanism)
+    command = points.with_free_shaft(str(path), path.stem, study.joint)
     if note := points.note_on_shafts(study.tolerances, axial, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)

@@ -229,6 +229,13 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
+    if mechanism.is_shaft:
+        fields += [
+            Field("shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
+            Field("shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
+        ]
+    if any(bushing.pushed for bushing in mechanism.bushings):
+        fields.append(Field("operation.spline", "1", "force of the spline that friction holds, over the largest"))
     if mechanism.unbalance:
         fields += [
             Field("shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error, raise_a
 from tolstat.common.loads import load_of, loads_of, split, units_of_limits
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import Joint, Series, reading
+from tolstat.joint import DriveShaft, Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -30,7 +30,7 @@ from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "series", "solver", "errors")
+OF_CASE = ("joint", "operation", "shaft", "solver", "errors")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
@@ -141,7 +141,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "fit": fits.read,
     "joint": _joint,
     "assumed": _assumed,
-    "series": lambda file: file.model(Series, file.data["series"], "series") if "series" in file.data else None,
+    "shaft": lambda file: file.model(DriveShaft, file.data["shaft"], "shaft") if "shaft" in file.data else None,
     "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
     "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
@@ -277,7 +277,7 @@ def load(
     whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
-        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "series")}
+        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "shaft")}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
         study = Study(file.path, file.text, **parts)
         with gather(file.faults):
@@ -305,7 +305,7 @@ def load_case(path: str | Path) -> Study:
     file = Reading(Path(path), OF_CASE)
     if "sampling" in file.data:
         raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
-    _read(file, ["joint", "series"])
+    _read(file, ["joint", "shaft"])
     with gather(file.faults):
         file.parts["operation"] = points.operation(file)
     _read(file, ["solver", "errors"])

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
-from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
@@ -295,8 +295,10 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint = self.parts.get("joint")
-        return MECHANISMS[named(SERIES if "series" in self.data else CARDAN, joint.parts if joint else PARTS)]
+        joint, shaft, base = self.parts.get("joint"), self.data.get("shaft"), CARDAN
+        if shaft is not None:
+            base = SPLINED if isinstance(shaft, dict) and "spline" in shaft else SHAFT
+        return MECHANISMS[named(base, joint.parts if joint else PARTS)]
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

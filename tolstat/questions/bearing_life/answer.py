@@ -188,7 +188,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     lives = rating.lives_of(view)
     row, undecided = rating.below_rows(lives)[-1], ""
     if lives.valid and lives.unrated == lives.valid:
-        nothing = "no joint" if lives.in_series else "no bearing"
+        nothing = "no joint" if lives.of_shaft else "no bearing"
         undecided = f"{nothing} has a rating: {_why_unrated(lives, 'every joint')}"
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
@@ -200,7 +200,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
 
 def _why_unrated(lives: rating.Lives, joints: str) -> str:
     each = " at each of its operating points" if len(lives.duty) > 1 else ""
-    whose = "a bearing of " if lives.in_series else ""
+    whose = "a bearing of " if lives.of_shaft else ""
     return (
         f"{whose}{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from "
         "which on the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not "
@@ -218,7 +218,7 @@ def _at_points(lives: rating.Lives) -> Iterator[str]:
         time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
         where = f"at {point}{time} " if point else ""
         swinging = "every joint swings" if number == lives.valid else f"{number} of {lives.valid} joints swing"
-        if lives.in_series:
+        if lives.of_shaft:
             swinging = f"a bearing of {swinging.removesuffix('s')}s"
         words = (
             f"{where}{swinging} by less than {_angle(lives)} to either side: the tracks of neighbouring needles do not "

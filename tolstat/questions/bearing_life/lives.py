@@ -82,9 +82,9 @@ class Lives:
         return (*self.pins, JOINT)
 
     @property
-    def in_series(self) -> bool:
+    def of_shaft(self) -> bool:
         """Whether the bearings are of several joints, which swing by different angles."""
-        return self.view.mechanism.in_series
+        return self.view.mechanism.is_shaft
 
     @property
     def valid(self) -> int:

@@ -113,7 +113,7 @@ def drawings(view: View) -> Answer:
     -------
     Answer
         Pictures: the joint from all sides, with the places of the leading loads marked, before it a plain picture of
-        joints in series; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
+        drive shafts; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
     kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
@@ -182,7 +182,7 @@ def read(
     row : int, optional
         Row of the campaign whose errors are drawn; of a result file.
     alpha : str, optional
-        Misalignment in place of the source's own, ``"20 deg"``, of joints in series that of the first; a joint file has
+        Misalignment in place of the source's own, ``"20 deg"``, of drive shafts that of the first; a joint file has
         none: 15 deg by default.
 
     Returns
@@ -190,7 +190,7 @@ def read(
     joint : Joint
         The nominal joint; of a result file that of its first slot, or of the row.
     alphas : list of float
-        Its misalignment, rad, of joints in series that of each; of several operating points those of the first.
+        Its misalignment, rad, of drive shafts that of each; of several operating points those of the first.
     title : str
         A headline.
     errors : ndarray, shape (1,), dtype ERROR, or None
@@ -241,7 +241,7 @@ def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str =
     joint : Joint
         The nominal joint, such as ``study.joint``.
     alpha : float or sequence of float
-        Misalignment, rad; of joints in series that of each.
+        Misalignment, rad; of drive shafts that of each.
     title : str
         Headline; the joint's description by default.
     columns : int
@@ -326,7 +326,7 @@ def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
         ("arm.d", arm.d, "diameter of a round arm"),
     ]
     shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
-    for key, alpha in zip(("operation.alpha", "series.alpha"), alphas, strict=False):
+    for key, alpha in zip(("operation.alpha", "shaft.alpha"), alphas, strict=False):
         shown.append((key, f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
     if joint.thrust is not None:
         shown.append(

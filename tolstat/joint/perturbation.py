@@ -270,8 +270,8 @@ def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any
     # distance of the base's reference point from the joint's centre, along the base
     ends = {"input": 0.0, "output": 0.0}
     if shaft is not None:
-        first, *_, last = (tube.at for tube in tubes.values())
-        ends = {"joint1.input": 0.0, "joint1.output": first, "joint2.input": last - shaft.length, "joint2.output": 0.0}
+        at = [tube.at for tube in tubes.values()]
+        ends = {"joint1.input": 0.0, "joint1.output": at[0], "joint2.input": at[-1] - shaft.length, "joint2.output": 0.0}
     for end, base in ends.items():
         prefix = end.removesuffix("input").removesuffix("output")
         side = -1.0 if end.endswith("input") else 1.0

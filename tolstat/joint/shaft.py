@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -131,6 +132,13 @@ class DriveShaft(Strict):
         if self.spline is not None and self.spline.at >= self.length:
             raise refuse("spline.at = {spline.at} is not between the joints", "give less than length", "spline.at")
         return self
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> DriveShaft:
+        """Drive shaft from its values in SI units, as result files hold them."""
+        parts: dict[str, type[Strict]] = {"tube": Tube, "tube2": Tube, "spline": Spline}
+        made = {key: part.model_construct(**values[key]) for key, part in parts.items() if values.get(key)}
+        return cls.model_construct(**{**values, **made})
 
     @property
     def in_words(self) -> str:

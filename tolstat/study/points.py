@@ -71,7 +71,7 @@ class Point(NamedTuple):
         keys["partner"] = Partner.model_construct(**keys["partner"]) if "partner" in keys else None
         kind: type[Operation] = OperationOfShaft if "shaft" in keys else Operation
         if "shaft" in keys:
-            keys["shaft"] = DriveShaft.model_construct(**keys["shaft"])
+            keys["shaft"] = DriveShaft.of(keys["shaft"])
         return cls(name, kind.model_construct(None, **keys), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Two joints in series: what differs from one joint in the questions."""
+"""Drive shafts: what differs from one joint in the questions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from tests.support.environment import ROOT
 from tests.support.views import FakeStore
 from tolstat import joint, study
 from tolstat.campaign.plan import Reversals, _reversals
-from tolstat.common.cardan import SERIES
 from tolstat.common.columns import result_columns
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status, tables, without_results
@@ -17,6 +16,7 @@ from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.bearing_life.lives import lives_of
 from tolstat.questions.drawings import answer as drawings
+from tolstat.questions.drawings import shaft as picture
 from tolstat.questions.exceedance import curves
 from tolstat.solver import stationary
 from tolstat.store.view import View
@@ -29,7 +29,7 @@ BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diamet
 
 @pytest.fixture(scope="module")
 def of_study():
-    return study.load(ROOT / "studies" / "series.toml")
+    return study.load(ROOT / "studies" / "shaft.toml")
 
 
 @pytest.fixture
@@ -37,19 +37,20 @@ def view(of_study):
     """Make a view of joints whose bearings carry 600 N each; `angles` are the misalignments, deg."""
 
     def make(angles=(15.0, 30.0), n=40):
-        results = without_results(n, Status.OK, SERIES)
+        mechanism = of_study.mechanism
+        results = without_results(n, Status.OK, mechanism)
         rise = np.random.default_rng(1).gamma(3.0, 0.1, n)
         for name in (name for name in results.dtype.names if name.endswith("_max")):
             results[name] = (500.0 * (1.0 + rise)).reshape(-1, *(1 for _ in results[name].shape[1:]))
         results["settled"], results["equivalent_load"], results["mode_share"] = 1, 600.0, 0.25
-        stationary.fill_intervals(results, SERIES)
+        stationary.fill_intervals(results, mechanism)
         held = joint.load("cirelli2021", {"bearing": BEARING}, "x.toml").given("json")
-        errors = np.repeat(nominal_errors(1, SERIES), n)
-        store = FakeStore("random", of_study.limits, errors, results, columns=result_columns(SERIES), joint=held)
+        errors = np.repeat(nominal_errors(1, mechanism), n)
+        store = FakeStore("random", of_study.limits, errors, results, columns=result_columns(mechanism), joint=held)
         first, second = np.radians(angles)
-        series = of_study.operation.series.model_copy(update={"alpha": second})
-        operation = of_study.operation.model_copy(update={"alpha": first, "series": series})
-        store.mechanism, store.points = SERIES, {"": Point("", operation, 1.0)}
+        shaft = of_study.operation.shaft.model_copy(update={"alpha": second})
+        operation = of_study.operation.model_copy(update={"alpha": first, "shaft": shaft})
+        store.mechanism, store.points = mechanism, {"": Point("", operation, 1.0)}
         return View(store)
 
     return make
@@ -72,9 +73,11 @@ def test_a_pair_has_no_rating_where_one_of_its_bearings_frets(view):
 
 
 def test_no_reversals_are_counted(of_study):
-    params = perturb(of_study.joint, of_study.operation, nominal_errors(3, SERIES))
+    params = perturb(of_study.joint, of_study.operation, nominal_errors(3, of_study.mechanism))
     params["torque"] = 1e-6
-    assert _reversals(params, np.zeros(3, tables(SERIES).RESULT), SERIES) == Reversals(0, None, None)
+    assert _reversals(params, np.zeros(3, tables(of_study.mechanism).RESULT), of_study.mechanism) == Reversals(
+        0, None, None
+    )
 
 
 def test_limits_of_the_picture_name_the_joint(view):
@@ -85,12 +88,12 @@ def test_limits_of_the_picture_name_the_joint(view):
 
 
 def test_a_change_may_set_joint_2(of_study):
-    text = changes.with_settings(of_study, ["series.alpha=8 deg"])
+    text = changes.with_settings(of_study, ["shaft.alpha=8 deg"])
     assert changes.read(of_study, text).operation.alphas == pytest.approx(np.radians([8.0, 8.0]))
-    assert changes.words(of_study, text) == "changed: series.alpha 6 deg → 8 deg"
+    assert changes.words(of_study, text) == "changed: shaft.alpha 6 deg → 8 deg"
     alone = study.load(ROOT / "studies" / "rigid_shafts.toml")
-    with pytest.raises(InputError, match="is in section 'series', which changes no joint"):
-        changes.with_settings(alone, ["series.alpha=8 deg"])
+    with pytest.raises(InputError, match="is in section 'shaft', which changes no joint"):
+        changes.with_settings(alone, ["shaft.alpha=8 deg"])
 
 
 def test_the_mounting_of_shafts_is_not_assumed(of_study):
@@ -98,15 +101,24 @@ def test_the_mounting_of_shafts_is_not_assumed(of_study):
     assert "mounting" not in {each.name for each in assumptions(of_study)}
 
 
-def test_the_page_has_a_plain_picture_of_each_joint_beside_its_own_drawing(view):
-    pair = view()
-    plain, words, drawn, *_ = drawings.drawings(pair).parts
-    assert [panel.key for panel in plain.panels] == ["plain-joint1", "plain-joint2"]
-    marked = {name.partition(".")[0]: name.rpartition(".")[0] for name in pair.leading}
-    for panel in plain.panels:
-        name = panel.key.removeprefix("plain-")
-        assert panel.title == f"{name} in three views"
-        assert (f"Marked: {marked[name]}." in panel.description) == (name in marked)
-    assert marked
-    assert words.text.endswith("joint1.output and joint2.input are one body.")
+def test_the_page_has_a_picture_of_the_shaft_before_those_of_its_joints(view):
+    whole, drawn, *_ = drawings.drawings(view()).parts
+    assert [panel.key for panel in whole.panels] == ["drive-shaft"]
+    assert "joint 1 of 15 deg, Z arrangement, joint 2 of 30 deg" in whole.panels[0].description
     assert [panel.key for panel in drawn.panels[:2]] == ["joint-front-joint1", "joint-side-joint1"]
+
+
+@pytest.mark.parametrize(
+    ("arrangement", "end"),
+    [
+        ("Z", (np.sin(np.radians(2)), 0.0, np.cos(np.radians(2)))),  # 8 deg up, 6 deg down again
+        ("W", (np.sin(np.radians(14)), 0.0, np.cos(np.radians(14)))),
+    ],
+)
+def test_shafts_are_drawn_as_they_are_arranged(of_study, arrangement, end):
+    shaft = of_study.operation.shaft.model_copy(update={"arrangement": arrangement})
+    ends, bearings = picture.points_of(of_study.joint, of_study.operation.model_copy(update={"shaft": shaft}))
+    first, second = np.radians(8), 1e3 * shaft.length
+    np.testing.assert_allclose(ends[2], (second * np.sin(first), 0.0, second * np.cos(first)), atol=1e-9)
+    np.testing.assert_allclose(ends[3] - ends[2], np.linalg.norm(ends[3] - ends[2]) * np.array(end), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(bearings[:2], axis=1), (70.0, 190.0))

@@ -261,7 +261,7 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
     command = points.with_free_shaft(str(path), path.stem, study.joint)
-    if note := points.note_on_shafts(study.tolerances, axial, command):
+    if note := points.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):

@@ -233,6 +233,11 @@ class Mechanism(NamedTuple):
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
 
     @property
+    def has_spline(self) -> bool:
+        """Whether a given force acts along one of its bushings, that of a spline that sticks."""
+        return any(bushing.pushed for bushing in self.bushings)
+
+    @property
     def is_shaft(self) -> bool:
         """Whether it is a drive shaft, of several Cardan joints one behind the other."""
         return len(self.cardan) > 1

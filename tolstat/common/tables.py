@@ -234,7 +234,7 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             Field("shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
             Field("shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
         ]
-    if any(bushing.pushed for bushing in mechanism.bushings):
+    if mechanism.has_spline:
         fields.append(Field("operation.spline", "1", "force of the spline that friction holds, over the largest"))
     if mechanism.unbalance:
         fields += [

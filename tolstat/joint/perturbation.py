@@ -271,7 +271,12 @@ def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any
     ends = {"input": 0.0, "output": 0.0}
     if shaft is not None:
         at = [tube.at for tube in tubes.values()]
-        ends = {"joint1.input": 0.0, "joint1.output": at[0], "joint2.input": at[-1] - shaft.length, "joint2.output": 0.0}
+        ends = {
+            "joint1.input": 0.0,
+            "joint1.output": at[0],
+            "joint2.input": at[-1] - shaft.length,
+            "joint2.output": 0.0,
+        }
     for end, base in ends.items():
         prefix = end.removesuffix("input").removesuffix("output")
         side = -1.0 if end.endswith("input") else 1.0

@@ -45,13 +45,14 @@ class Tube(Strict):
     def _one_of_two(self) -> Tube:
         ways = ("diameter", "wall"), ("mass", "inertia", "inertia_across")
         given = [[key for key in way if getattr(self, key) is not None] for way in ways]
+        section, mass = (" and ".join(keys) for keys in given)
         if all(given):
-            raise refuse(f"has {given[0][0]} beside {given[1][0]}", f"remove {given[0][0]}, or {given[1][0]}")
+            raise refuse(f"has {section} beside {mass}", f"remove {section}, or {mass}")
         if not any(given):
             raise refuse("has neither a section nor a mass", 'give diameter = "76 mm" and wall = "2.5 mm", of yours')
         way = ways[0] if given[0] else ways[1]
         if lacking := [key for key in way if getattr(self, key) is None]:
-            raise refuse(f"has {given[0] or given[1]} without {lacking}", f"add {' and '.join(lacking)}")
+            raise refuse(f"has {section or mass} without {' and '.join(lacking)}", f"add {' and '.join(lacking)}")
         if self.wall is not None and self.diameter is not None and self.wall > 0.5 * self.diameter:
             raise refuse("its wall is thicker than half of its diameter", "check wall and diameter")
         return self

@@ -119,7 +119,7 @@ def note_on_mounting(store: Reader) -> str:
     names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
     joint, name = joint_of(store, 0), store.study_name
     command = points.with_free_shaft(f"{name}.toml", name, joint)
-    return points.note_on_shafts(names, mountings(store)[0], command)
+    return points.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

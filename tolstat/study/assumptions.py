@@ -76,9 +76,11 @@ def given(study: Study) -> tuple[str, ...]:
     """Names of the assumptions of the joint file that the study gives: its ``[joint]`` or fit sets one of their keys.
 
     A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
+    Beside a spline so is ``shaft.axial``, since a second part that slides would hold nothing.
     """
     replaced = {entry.name for entry in study.assumed}
-    keys = derived.changed(leaves(_keys_of_study(study)).keys(), leaves(study.joint.given("json")))
+    of_study = {*leaves(_keys_of_study(study)), *(("shaft.axial",) if study.mechanism.has_spline else ())}
+    keys = derived.changed(of_study, leaves(study.joint.given("json")))
     return tuple(
         entry.name
         for entry in study.joint.assumed

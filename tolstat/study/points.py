@@ -20,10 +20,10 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import DriveShaft, Joint, Operation, OperationOfShaft, orders
+from tolstat.joint import DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
-from tolstat.joint.sections import RIGID
+from tolstat.joint.sections import FREE, RIGID
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
 
@@ -315,12 +315,15 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"
         yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
+    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).has_spline):
+        found = "is free beside a spline, which slides, too: nothing holds the shaft along its axis"
+        yield ("joint", "shaft", "axial"), found, 'write axial = "rigid", or remove shaft.spline'
     for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
         yield ("solver", "fidelity"), *texts
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
-    """Command that runs a study with an output shaft that is free along its axis; empty where it cannot be.
+    """Command that runs a study with an output shaft that is free along its axis.
 
     Parameters
     ----------
@@ -335,7 +338,7 @@ def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
     return f"tolstat run {quote(study)} {settings} --out {quote(f'{stem}_free.h5')}"
 
 
-def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], command: str) -> str:
+def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], mechanism: Mechanism, command: str) -> str:
     """Say what rigid shafts do to errors along them, and the command that tries a free one.
 
     Parameters
@@ -344,22 +347,23 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
         Errors and zones that scatter.
     axial : iterable of float or str
         ``shaft.axial`` of each variant.
+    mechanism : Mechanism
+        What is simulated.
     command : str
-        The command; empty if there is none.
+        The command.
 
     Returns
     -------
     str
-        Empty where a shaft may move, or no error along the shafts scatters.
+        Empty where a shaft may move or a spline gives way, or no error along the shafts scatters.
     """
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
-    if not along or any(value != RIGID for value in axial):
+    if not along or mechanism.has_spline or any(value != RIGID for value in axial):
         return ""
-    note = (
+    return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        "them: some loads are larger than with a spline."
+        f"them: some loads are larger than with a spline.\nWith a free output shaft: {command}"
     )
-    return f"{note}\nWith a free output shaft: {command}" if command else note
 
 
 def note_on_pins(toleranced: Iterable[str], mechanism: Mechanism) -> str:

@@ -83,7 +83,7 @@ def test_no_reversals_are_counted(of_study):
 def test_limits_of_the_picture_name_the_joint(view):
     axes = curves.sheet(view(), ()).axes
     labels = axes[3].get_legend_handles_labels()[1]
-    assert "limit 80 N m (joint2: 1, 2, 3, 4) ←" in labels  # the loads are all above it
+    assert "limit 275 N m (joint2: 1, 2, 3, 4)" in labels  # the loads are all above it
     assert "joint1.fork4.T" in labels
 
 

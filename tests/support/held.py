@@ -18,7 +18,7 @@ TUBE = {"mass": "5 kg", "inertia": "0.005 kg*m^2", "inertia_across": "0.15 kg*m^
 
 
 def drive_shaft(alpha: float, arrangement: str | float = "Z", **keys: Any) -> joints.DriveShaft:
-    """Drive shaft of 1.2 m with a spline in the middle whose joint 2 is bent by `alpha` (rad); keys of it in SI units."""
+    """Drive shaft of 1.2 m with a spline in the middle whose joint 2 is bent by `alpha`, rad; `keys` as a file has them."""
     spline = {"at": "0.6 m", "mu": 0.1, "diameter": "40 mm"}
     values = {"arrangement": arrangement, "length": "1.2 m", "tube": TUBE, "spline": spline, **keys}
     return joints.DriveShaft.model_validate({"alpha": f"{alpha} rad", **values})
@@ -32,7 +32,7 @@ def held(
     drive_shaft: joints.DriveShaft | None = None,
     **sections: Any,
 ) -> tuple[np.recarray[Any, np.dtype[np.void]], Mechanism]:
-    """The joint of Cirelli et al. at 100 N m, or a shaft of two, with sections of a joint file: parameters, mechanism."""
+    """The joint of Cirelli et al. at 100 N m, or a shaft of two, with sections of a joint file."""
     joint = joints.load("cirelli2021", sections, "case.toml")
     point = {"alpha": alpha, "speed": speed, "torque": 100.0, "axial_force": axial_force}
     operation = joints.Operation.model_construct(**point)

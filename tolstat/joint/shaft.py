@@ -84,7 +84,7 @@ class Spline(Strict):
     """stiffness against bending"""
     k_torsion: Annotated[units.RotaryStiffness, POSITIVE] = 1e5
     """stiffness against torsion"""
-    axial_damping: Annotated[units.Damping, POSITIVE] = 2e3
+    axial_damping: units.Damping = 2e3
     """damping of the motion along it"""
 
     @model_validator(mode="after")

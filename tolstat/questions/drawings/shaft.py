@@ -1,4 +1,4 @@
-"""Picture of a drive shaft to scale: its shafts and tubes from the side and from above, its forks seen along the tube."""
+"""Picture of a drive shaft to scale: shafts and tubes from the side and from above, forks seen along the tube."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from tolstat.joint import Joint, OperationOfShaft
 from tolstat.questions.drawings.views import Array, Look
 
 LEFT, RIGHT, SCALE, TITLE, LEAST, FORKS = 0.62, 0.1, 0.5, 0.26, 0.75, 1.25
-"""Room beside a view, below it for its scale and above it for its title; least height of a view, size of the forks; in."""
+"""Room beside a view, below it for its scale and above it for its title; least height of a view, size of forks; in."""
 LINES = {"tube": (1, COLOURS[0], 5.0), "input shaft": (0, COLOURS[1], 2.4), "output shaft": (2, COLOURS[2], 2.4)}
 """Number of the first end of each line, its colour and width."""
 SPLINE: Look = {"marker": "|", "ls": "", "ms": 14.0, "mew": 2.0, "color": INK}
 JOINT: Look = {"marker": "o", "ls": "", "ms": 7.0, "mfc": "white", "mec": INK, "mew": 1.4, "zorder": 5}
 BEARING: Look = {"marker": "^", "ls": "", "ms": 6.0, "mfc": "white", "mec": INK, "mew": 1.1, "zorder": 5}
+ARROW: Look = {"arrowstyle": "->", "color": INK, "ls": DASHES[3]}
 NAME: Look = {"textcoords": "offset points", "ha": "center", "va": "center", "size": 8.0}
 
 
@@ -32,7 +33,7 @@ def picture(joint: Joint, operation: OperationOfShaft) -> Panel:
     size = WIDTH, TITLE + sum(heights) + 2 * (SCALE + TITLE) + FORKS
     words = (
         f"Drive shaft of {1e3 * shaft.length:.4g} mm: joint 1 of {np.degrees(operation.alpha):.4g} deg, "
-        f"{shaft.in_words}; from the side, in the plane of joint 1; from above; and the forks on the tube, seen along it"
+        f"{shaft.in_words}; from the side, in the plane of joint 1; from above; and the forks, seen along the tube"
     )
     draw = partial(_draw, ends=ends, bearings=bearings, operation=operation, heights=heights, scale=scale, size=size)
     return Panel("drive-shaft", "The drive shaft, to scale", words, draw, size, bare=True)
@@ -114,9 +115,7 @@ def _draw_forks(view: Axes, operation: OperationOfShaft) -> None:
         view.plot([-y, y], [-x, x], color=colour, lw=width, label=label, gid=f"fork.{number}")
     for number, angle in enumerate((0.0, shaft.plane), 1):
         x, y = np.sin(angle), np.cos(angle)
-        view.annotate(
-            "", (1.1 * x, 1.1 * y), (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": INK, "ls": DASHES[3]}
-        )
+        view.annotate("", (1.1 * x, 1.1 * y), (0.0, 0.0), arrowprops=ARROW)
         view.annotate(f"plane {number}", (1.32 * x, 1.32 * y), (0.0, 0.0), **NAME)
     view.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), xticks=[], yticks=[])
     view.spines[:].set_visible(False)

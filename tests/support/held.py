@@ -18,7 +18,7 @@ TUBE = {"mass": "5 kg", "inertia": "0.005 kg*m^2", "inertia_across": "0.15 kg*m^
 
 
 def drive_shaft(alpha: float, arrangement: str | float = "Z", **keys: Any) -> joints.DriveShaft:
-    """Drive shaft of 1.2 m with a spline in the middle whose joint 2 is bent by `alpha`, rad; `keys` as a file has them."""
+    """Drive shaft of 1.2 m with a spline in the middle whose joint 2 is bent by `alpha` (rad); `keys` as in a file."""
     spline = {"at": "0.6 m", "mu": 0.1, "diameter": "40 mm"}
     values = {"arrangement": arrangement, "length": "1.2 m", "tube": TUBE, "spline": spline, **keys}
     return joints.DriveShaft.model_validate({"alpha": f"{alpha} rad", **values})

@@ -339,7 +339,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     errors = sampling.draw(listed)
     with Writer.create(tmp_path / "a.h5", listed, [errors]) as store:
         found = recorded.parameters(store, np.array([0, 3]))
-        settings = [recorded.options_of(store, row) for row in (0, 3)]
+        settings = [recorded.options_of(store, row, attempt=0) for row in (0, 3)]
     for k, row in enumerate((0, 3)):
         variant = listed.design["variant"][row]
         own = joint.perturb(listed.joints[variant], listed.operations[variant], errors[row : row + 1])

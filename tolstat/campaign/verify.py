@@ -183,7 +183,8 @@ def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> 
 
 def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
-    options = [options_of(store, slot) for slot in slots.tolist()]
+    attempts = pick(store.attempt, slots)
+    options = [options_of(store, *of_joint) for of_joint in zip(slots.tolist(), attempts.tolist(), strict=True)]
     checks = make(parameters(store, slots), options, store.mechanism)
     for check in checks.values():
         blank_others(check.results, store.columns, store.mechanism)

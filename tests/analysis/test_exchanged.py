@@ -67,7 +67,10 @@ def test_no_interval_leaves_0_to_1():
     a, b = np.random.default_rng(3).normal(size=(2, 60, 2))
     load = lambda x: x[..., 0] + 0.1 * x[..., 1]  # noqa: E731
     mixed = np.stack([np.where([True, False], b, a), np.where([False, True], b, a)], axis=1)
-    found = exchanged.indices(load(a), load(b), load(mixed)), exchanged.of_event(load(a) > 1, load(b) > 1, load(mixed) > 1)
+    found = (
+        exchanged.indices(load(a), load(b), load(mixed)),
+        exchanged.of_event(load(a) > 1, load(b) > 1, load(mixed) > 1),
+    )
     ends = np.array([(index.lower, index.upper) for own in found for index in (own.first, own.total)])
     assert (ends.min(), ends.max()) == (0.0, 1.0)
 

@@ -277,6 +277,9 @@ def test_a_speed_in_the_wrong_unit_is_told(folder: Path) -> None:
     )
     (message,) = told(folder, points, ("500 rpm", "800 rad/s"))
     assert message.startswith(":11: operation[1].speed: 7639 rpm at 15 deg at fast: ")
+    (message,) = told(folder, points, ("500 rpm", "800 rad/s"), ("1 rpm", "40000 rpm"))
+    assert message.startswith(":11: operation[1].speed: 7639 rpm at 15 deg at fast: ")
+    assert "makers of joint shafts allow, as at 1 other point\n" in message
 
 
 def test_commands_tell_such_warnings(folder: Path) -> None:

@@ -249,6 +249,9 @@ def test_commands_run_without_docstrings_or_say_why_not(tmp_path):
     done = shell("new", tmp_path / "a.toml", PYTHONOPTIMIZE="2")
     assert (done.returncode, list(tmp_path.glob("a.*"))) == (2, [])
     assert "python -OO: leaves out the texts" in done.stderr
+    done = shell("docs", "study.schema.json", PYTHONOPTIMIZE="2")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "python -OO: leaves out the texts" in done.stderr
 
 
 @pytest.mark.slow

@@ -273,10 +273,24 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
         yield "'ideal' does not hold in series: its closed forms are those of one joint", remedy
 
 
+def _in_series(settings: Sequence[Setting]) -> list[Setting]:
+    return [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
+
+
+def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
+    """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
+    if not any(setting.joint.shaft.slides for setting in settings):
+        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        free = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        remedy = "remove it" if _in_series(settings) else free
+        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
+            yield path, "has no effect: the output shaft is rigid along its axis", remedy
+
+
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
-    In series, refuse what only one joint can have.
+    In series, refuse what only one joint can have. For forces see `idle_forces`.
 
     Parameters
     ----------
@@ -290,12 +304,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     tuple
         Key path, what was found, remedy.
     """
-    in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
-    if not any(setting.joint.shaft.slides for setting in settings):
-        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        remedy = "remove it" if in_series else 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
-        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
-            yield path, "has no effect: the output shaft is rigid along its axis", remedy
+    in_series = _in_series(settings)
     for key in ("speed", "torque"):
         if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"

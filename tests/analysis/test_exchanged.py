@@ -34,7 +34,7 @@ def test_an_error_without_effect_on_an_event_has_an_interval_that_is_no_point():
     a, b = np.random.default_rng(5).standard_normal((2, 200, 1))
     found = exchanged.of_event(a[:, 0] > 1.0, b[:, 0] > 1.0, (a > 1.0))
     assert found.first.estimate.tolist() == found.total.estimate.tolist() == [0.0]
-    assert found.first.lower[0] < 0.0 < found.first.upper[0] < 0.3
+    assert found.first.lower[0] == 0.0 < found.first.upper[0] < 0.3
     assert 0.0 < found.total.upper[0] < 0.1
 
 
@@ -61,6 +61,18 @@ def test_indices_of_ishigamis_function_cover_and_frozen_for_picked_does_not():
     assert min(*first, *total) >= LEAST
     assert max(*first, *total) < 0.995
     assert np.mean(wrong, axis=0).max() < LEAST
+
+
+def test_no_interval_leaves_0_to_1():
+    a, b = np.random.default_rng(3).normal(size=(2, 60, 2))
+    load = lambda x: x[..., 0] + 0.1 * x[..., 1]  # noqa: E731
+    mixed = np.stack([np.where([True, False], b, a), np.where([False, True], b, a)], axis=1)
+    found = (
+        exchanged.indices(load(a), load(b), load(mixed)),
+        exchanged.of_event(load(a) > 1, load(b) > 1, load(mixed) > 1),
+    )
+    ends = np.array([(index.lower, index.upper) for own in found for index in (own.first, own.total)])
+    assert (ends.min(), ends.max()) == (0.0, 1.0)
 
 
 def test_estimates_are_scipys():

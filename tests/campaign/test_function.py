@@ -69,6 +69,13 @@ def test_what_is_drawn_alone_has_a_distribution():
     assert "groups" not in f.salib()
 
 
+def test_a_study_may_be_given_by_its_path():
+    for path in (MAIN, str(MAIN)):
+        assert tolstat.function(path, ["psi"]).names == tolstat.function(load(MAIN), ["psi"]).names
+    with pytest.raises(InputError, match=r"absent\.toml"):
+        tolstat.function("absent.toml")
+
+
 def test_faults():
     with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
         tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
@@ -108,7 +115,7 @@ def test_joints_of_a_lot_have_no_cube():
 @pytest.mark.parametrize(
     ("x", "words"),
     [
-        (np.zeros((2, 3)), r"shape \(n, 13\), .* not \(2, 3\); they are pin1\.offset_t, "),
+        (np.zeros((2, 3)), r"^an array of shape \(n, 13\), a row .* each of f\.names is needed, not \(2, 3\)$"),
         (np.zeros(13), r"not \(13,\); give \[x\] for one joint"),
         (0.0, r"not \(\)"),
     ],

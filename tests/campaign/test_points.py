@@ -14,7 +14,7 @@ from tolstat.analysis.cycles import duty_cycle
 from tolstat.campaign import extend, replay
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import settings_in_use
-from tolstat.campaign.remedy import Retry
+from tolstat.campaign.remedy import Reason, Retry, in_words
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
 from tolstat.joint import Operation, load
@@ -224,3 +224,23 @@ def test_simulated_joints_at_three_points_equal_those_of_three_studies(tmp_path:
     with ResultFile.open(whole) as store:
         assert not replay.replay(store.at("start"), 2).differences
         assert store.view().study.points == study.load(tmp_path / "all.toml").points
+
+
+def test_why_joints_have_no_load_is_said_once_for_all_points():
+    outside, failed = Status.OUTSIDE_MODEL, Status.NEWTON_FAILED
+    reasons = [
+        Reason(outside, 5, 2, "check the units", "low"),
+        Reason(failed, 4, 6, "failed at step 3", "mid"),
+        Reason(outside, 3, 4, "check the units", "high"),
+        Reason(failed, 1, 7, "failed at step 9", "low"),
+    ]
+    first, second = in_words(reasons)
+    head, hint = first.splitlines()
+    assert head.startswith("5 joints outside_model at low, 3 at high: ")
+    assert hint == "  hint, for row 2 at low: check the units"
+    head, *hints = second.splitlines()
+    assert head.startswith("4 joints newton_failed at mid, 1 at low: ")
+    assert hints == ["  hint, for row 6 at mid: failed at step 3", "  hint, for row 7 at low: failed at step 9"]
+    (alone,) = in_words([Reason(failed, 1, 7, "failed at step 9")])
+    assert alone.startswith("1 joint newton_failed: ")
+    assert alone.endswith("\n  hint, for row 7: failed at step 9")

@@ -210,6 +210,18 @@ def test_of_few_joints_all_are_checked_and_without_limits_all_are_chosen_at_rand
     assert numbers == [min(at_random, n - failed), max(near - failed, 0) if n < 58 else near]
 
 
+def test_workers_share_the_check_at_the_end_of_a_run_and_change_none_of_its_numbers(tmp_path):
+    checked = []
+    for workers in (1, 3):
+        path = tmp_path / f"{workers}.h5"
+        fakes.run(fakes.Study(n=200), path, workers, 50, check=True)
+        with ResultFile.open(path) as store:
+            checked.append(verification.read(store))
+    one, three = checked
+    assert one.rows.tolist() == three.rows.tolist()
+    assert np.array_equal(one.checks["finer"].results, three.checks["finer"].results)
+
+
 def test_more_joints_are_checked_of_large_campaigns():
     assert [chosen.few(n) for n in (10, 1024, 5900, 29_900, 10**7)] == [29, 29, 59, 299, 299]
 
@@ -339,7 +351,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     errors = sampling.draw(listed)
     with Writer.create(tmp_path / "a.h5", listed, [errors]) as store:
         found = recorded.parameters(store, np.array([0, 3]))
-        settings = [recorded.options_of(store, row) for row in (0, 3)]
+        settings = [recorded.options_of(store, row, attempt=0) for row in (0, 3)]
     for k, row in enumerate((0, 3)):
         variant = listed.design["variant"][row]
         own = joint.perturb(listed.joints[variant], listed.operations[variant], errors[row : row + 1])

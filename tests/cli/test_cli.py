@@ -239,6 +239,36 @@ def test_an_option_means_the_same_in_all_commands():
     }
 
 
+@pytest.mark.slow
+def test_commands_run_without_docstrings_or_say_why_not(tmp_path):
+    path = synthetic.store(tmp_path)
+    done = shell("capability", path, PYTHONOPTIMIZE="2")
+    assert (done.returncode, done.stdout) == (0, shell("capability", path).stdout)
+    for command in ("causes", "plan", "rare", "compare"):
+        assert shell(command, "--help", PYTHONOPTIMIZE="2").returncode == 0
+    done = shell("new", tmp_path / "a.toml", PYTHONOPTIMIZE="2")
+    assert (done.returncode, list(tmp_path.glob("a.*"))) == (2, [])
+    assert "python -OO: leaves out the texts" in done.stderr
+    done = shell("docs", "study.schema.json", PYTHONOPTIMIZE="2")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "python -OO: leaves out the texts" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])
+def test_output_in_an_encoding_without_some_characters(encoding):
+    done = subprocess.run(
+        [sys.executable, "-m", "tolstat", "docs", "study"],
+        capture_output=True,
+        check=True,
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+    )
+    assert not done.stderr
+    shown = done.stdout.decode("utf-8" if encoding == "ascii" else encoding)  # click writes UTF-8 in place of ASCII
+    assert len(shown) > 1000
+    assert encoding == "ascii" or re.search(r"\\u[0-9a-f]{4}", shown)
+
+
 def test_completion_knows_the_commands_and_loads_nothing_heavy():
     code = (
         "import sys\nfrom tolstat.cli import main\n"

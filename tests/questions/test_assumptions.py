@@ -17,6 +17,7 @@ from tolstat.campaign.work import Work
 from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import Simulation, Status, tables
+from tolstat.display.answer import Sentence
 from tolstat.questions.assumptions import answer as run
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.variations import BETTER, evaluate
@@ -143,6 +144,32 @@ def test_every_value_is_simulated_and_then_all_together(varied, quick):
     assert found.still == ["place of the cross bushings"]
     assert [own.name for own in found.fixed] == ["damping, oil film and hub"]
     assert simulated(path) == "all 5 variations are in the file, 600 joints of each"
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("fixed", [False, True])
+def test_a_rigid_shaft_is_varied_without_the_axial_force_and_says_so(tmp_path, fixed):
+    scatter = '[tolerances]\noperation.axial_force = { plus_minus = "500 N", distribution = "uniform" }\n'
+    free = 'shaft.axial = "free"\nshaft.mass = "5 kg"\nshaft.axial_damping = "2e4 N*s/m"\n'
+    text = TEXT.replace(GIVEN, GIVEN + free).replace('axial = "free" }', 'axial = "rigid" }')
+    change = (
+        ('torque = "100 N*m"\n', 'torque = "100 N*m"\naxial_force = "200 N"\n')
+        if fixed
+        else ("[tolerances]\n", scatter)
+    )
+    path = made(tmp_path, text.replace(*change))
+    simulated(path)
+    found = standing(path)
+    assert of(found, "shaft rigid")["n"] == 600
+    assert found.idle == ("shaft rigid",)
+    assert sentences.idle(found) == (
+        "shaft rigid: simulated without operation.axial_force and its tolerance, which do nothing to an output shaft "
+        "that is rigid along its axis"
+    )
+    with ResultFile.open(path) as store:
+        assert sentences.idle(found) in [
+            str(part.text) for part in tolstat.assumptions(store.view()).parts if isinstance(part, Sentence)
+        ]
 
 
 @pytest.mark.usefixtures("quick")
@@ -386,7 +413,7 @@ def test_nothing_assumed_and_nothing_simulated_are_told(tmp_path):
     text = TEXT.replace(ASSUMED, "").replace("[operation]", 'shaft.axial = "free"\ncross.r_b = "36 mm"\n[operation]')
     path.unlink()
     bare = made(tmp_path, text)
-    with pytest.raises(StoreError, match="nothing is assumed that is varied"):
+    with pytest.raises(StoreError, match="lists no other values to try: neither the study nor its joint file has"):
         simulated(bare)
     assert verdict(bare, 0.5).sentence.endswith(")")
 

@@ -128,6 +128,15 @@ def test_too_few_joints_have_no_lower_end_and_are_told_the_number_needed():
     assert few.needed == 3244  # 1 - 0.99865^n >= 1 - 0.05 / 4
 
 
+def test_an_index_of_a_handful_of_joints_has_no_interval_and_a_note():
+    loads = np.random.default_rng(1).normal(size=10)
+    cpk = capability_of(loads, np.ones(10), 2.0).cpk
+    assert np.isfinite(cpk.estimate)
+    assert np.isnan([cpk.lower, cpk.upper]).all()
+    for n, told in ((8, True), (64, False)):
+        assert ("no interval of Cpk where" in notes_of(view(limits={"cross1.F": 700.0}, n=n))) == told
+
+
 def test_unresolved_joints_lower_the_yield():
     loads, status = np.arange(100.0), np.full(100, Status.OK)
     status[:4] = Status.NOT_SETTLED

@@ -190,6 +190,21 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
         question.compare(one.view(), one.view())
 
 
+def test_loads_that_were_not_asked_for_need_not_be_in_both_files(tmp_path):
+    kept = "[output]\nresults = ['fork*.F_max']\n"
+    text = synthetic.WHOLE.partition("[limits]")[0] + kept + '[limits]\n"fork1.F" = "700 N"\n'
+    a, b = synthetic.store(tmp_path), synthetic.store(tmp_path, text, "b")
+    with ResultFile.open(a) as one, ResultFile.open(b) as other:
+        answer = question.compare(one.view(), other.view(), ["fork2.F"])
+        assert answer.frame("loads")["load"].unique().tolist() == ["fork2.F"]
+        assert answer.frame("shares")["load"].tolist() == ["fork1.F", "any limit"]
+        (told,) = [note for note in notes_of(answer) if note.startswith("limits left out: ")]
+        assert told.endswith("pin1.contact, psi, which only one file keeps")
+        assert {"cross1.F,", "fork4.T,"} <= set(told.split())
+        with pytest.raises(InputError, match=r"limits\.cross1\.F: 'cross1\.F' is not a load that both files keep"):
+            question.compare(one.view(), other.view())
+
+
 def test_pending_joints_are_not_compared(tmp_path):
     a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
     with ResultFile.open(a) as one, ResultFile.open(b) as other:

@@ -83,7 +83,7 @@ TOLD = {
     ("errors/pin1.offset_t", "verify --joints 2"): (2, OF_ERRORS),
     ("errors/pin1.offset_t", "merge --out b.h5"): (2, OF_ERRORS),
     **{("metadata", words): (2, OF_METADATA) for words in ("status", "report", "replay --row 10", "extend --n 50")},
-    **{("verify/finer/cross1.F_max", w): (2, OF_VERIFICATION) for w in ("report", "capability", "status")},
+    **{("verify/finer", w): (2, OF_VERIFICATION) for w in ("report", "capability", "status")},
     ("verify/rows", "export --statistics -"): (2, OF_VERIFICATION),
     **{
         ("histories/cycles", words): (2, OF_HISTORIES) for words in ("fatigue", "export --pylife -", "merge --out b.h5")
@@ -119,7 +119,7 @@ FOUND = {
     "ledger/attempt": "ledger/attempt of rows 8:16",
     "histories/cycles": "histories/cycles of rows 8:16",
     "errors/hole2.tilt_z": "errors/hole2.tilt_z of rows 8:16",
-    "verify/finer/steps": OF_VERIFICATION,
+    "verify/finer": OF_VERIFICATION,
     f"{SET}/status": "what_if: 1 change\n",
     "metadata": OF_METADATA,
 }
@@ -315,7 +315,7 @@ def test_damaged_checks_of_joints_near_a_limit_are_told_with_their_command(path:
         held = verification.read(store)
         assert held is not None
         verification.write([(store, verification.NEAR, held)])
-    damage.flip_in(path, f"{verification.NEAR}/finer/cross1.F_max", 0)
+    damage.flip_in(path, f"{verification.NEAR}/finer", 0)
     done = call(path, "status --check")
     assert done.exit_code == 2
     assert "--near LIMIT" in done.stderr

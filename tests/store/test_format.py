@@ -90,7 +90,7 @@ def test_every_group_is_described_and_opens_in_xarray_without_a_warning(whole: P
     verify(whole)
     names = groups(whole)
     always = {"/", "/errors", "/results", "/ledger", "/session", "/histories", "/checksums"}
-    assert {*names} == always | {"/verify", "/verify/newton", "/what_if", f"/what_if/{what_if.key(CHANGE)}"}
+    assert {*names} == always | {"/verify", "/what_if", f"/what_if/{what_if.key(CHANGE)}"}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in names:

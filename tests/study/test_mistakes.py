@@ -178,6 +178,12 @@ def test_bearings_and_unbalance_of_shafts(folder: Path, written: str, expected: 
         ('snap_rings.end_play = "0.02 mm"', "snap rings and cups are thrust: thrust = {"),
         ('bearing.C0 = "12 kN"', "the static load rating is used nowhere: leave it out"),
         ("friction.coefficient_of_friction = 0.05", "this is friction.mu under [joint]"),
+        ("mu = 0.05", "this is friction.mu under [joint]"),
+        ('end_play = "0.02 mm"', "this play of the cross is thrust.end_play under [joint]"),
+        ('unbalance = "5 g*mm"', "this is shaft.unbalance under [joint]"),
+        ('temperature = "80 degC"', "the model leaves out what heat does to clearances"),
+        ('roundness = "5 um"', "the model leaves out form errors and roughness"),
+        ('grease = "NLGI 2"', "the oil film is contact.c_t"),
     ],
 )
 def test_words_of_the_trade(folder: Path, written: str, remedy: str) -> None:
@@ -185,6 +191,28 @@ def test_words_of_the_trade(folder: Path, written: str, remedy: str) -> None:
         folder, STUDY.replace("own_joint.toml", "pin25").replace("[operation]", f"{written}\n[operation]")
     )
     assert any(f": unknown key\n  hint: {remedy}" in message for message in messages)
+
+
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        ("end_play", "this play of the cross is thrust.end_play under [joint]"),
+        ("concentricity", "the model has pins and holes whose axes are moved and tilted"),
+        ("pin*.roundness", "the model leaves out form errors and roughness"),
+    ],
+)
+def test_a_tolerance_of_what_the_model_does_not_have_is_refused_once(folder: Path, written: str, message: str) -> None:
+    entry = f'"{written}" = {{ plus_minus = "0.1 mm", distribution = "normal" }}\n'
+    (found,) = refused(folder, STUDY.replace("[tolerances]\n", f"[tolerances]\n{entry}"))
+    assert found.startswith(f":8: tolerances.{written}: selects nothing\n  hint: {message}")
+
+
+def test_lots_are_not_asked_for_where_an_entry_with_a_lot_has_a_fault(folder: Path) -> None:
+    text = STUDY.replace("n = 64", "n = 600\njoints_per_lot = 20")
+    (message,) = refused(folder, text)
+    assert message.startswith(":13: sampling.joints_per_lot: has no effect: no tolerance has a lot")
+    (message,) = refused(folder, text.replace("cpk = 1.0 }", "lot = { share = 30 } }"))
+    assert message.startswith(":9: tolerances.hole*.diameter.lot.share: 30: should be less than 1")
 
 
 def test_keys_of_friction_without_its_coefficient(folder: Path) -> None:
@@ -249,6 +277,9 @@ def test_a_speed_in_the_wrong_unit_is_told(folder: Path) -> None:
     )
     (message,) = told(folder, points, ("500 rpm", "800 rad/s"))
     assert message.startswith(":11: operation[1].speed: 7639 rpm at 15 deg at fast: ")
+    (message,) = told(folder, points, ("500 rpm", "800 rad/s"), ("1 rpm", "40000 rpm"))
+    assert message.startswith(":11: operation[1].speed: 7639 rpm at 15 deg at fast: ")
+    assert "makers of joint shafts allow, as at 1 other point\n" in message
 
 
 def test_commands_tell_such_warnings(folder: Path) -> None:

@@ -48,7 +48,8 @@ class Capability(NamedTuple):
         `cpk_normal` does not determine the share above the limit. NaN for fewer than 20 joints.
     cpk : Estimate
         Quantile index of the valid joints. Its interval is conservative: it covers with at least the given confidence.
-        With fewer joints than `needed` the lower end is at most 0.
+        With fewer joints than `needed` the lower end is at most 0; the interval is NaN where those of both quantiles
+        overlap, so that any index is possible.
     needed : int
         Minimum number of joints for a finite upper end of the interval of the 99.865 % quantile.
 
@@ -152,7 +153,7 @@ def _of_quantiles(sample: Sample, limit: float, confidence: float) -> Estimate[f
     if not sample.design.independent:
         return NONE._replace(estimate=index)
     if not middle.upper < high.lower:
-        return Estimate(index, -np.inf, np.inf)
+        return NONE._replace(estimate=index)
     # the index is monotone in each quantile with the other fixed: its extremes are at the corners
     corners = [_index(limit, m, h) for m in (middle.lower, middle.upper) for h in (high.lower, high.upper)]
     return Estimate(index, min(corners), max(corners))

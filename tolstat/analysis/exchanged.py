@@ -57,7 +57,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     Returns
     -------
     Indices
-        Not corrected for chance: the estimate of an index near 0 may be negative.
+        Not corrected for chance: the estimate of an index near 0 may be negative. Intervals are within 0 to 1.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def _recovered(
     for away, back in ((np.where(signs > 0, down, up), most), (np.where(signs > 0, up, down), least)):
         of_variance = index * (estimate / back - 1.0)
         lengths.append(np.sqrt((away**2).sum(axis=0) / estimate**2 + of_variance**2))
-    return Estimate(index, index - lengths[0], index + lengths[1])
+    return _within(index, index - lengths[0], index + lengths[1])
 
 
 def _index(terms: FloatArray, square: FloatArray, half: float) -> Estimate[FloatArray]:
@@ -166,4 +166,9 @@ def _index(terms: FloatArray, square: FloatArray, half: float) -> Estimate[Float
     if (c <= 0).any():
         raise ValueError("few points make up the variance of the load: decompose its logarithm")
     root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
-    return Estimate(mean / variance, (b - root) / c, (b + root) / c)
+    return _within(mean / variance, (b - root) / c, (b + root) / c)
+
+
+def _within(index: FloatArray, lower: FloatArray, upper: FloatArray) -> Estimate[FloatArray]:
+    """Index with its interval, of which the part outside 0 to 1 is cut off: no index is there."""
+    return Estimate(index, np.clip(lower, 0.0, 1.0), np.clip(upper, 0.0, 1.0))

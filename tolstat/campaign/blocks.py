@@ -45,6 +45,8 @@ MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
 together, whatever the block's size."""
+MIN_BESIDE = 16
+"""Minimum number of joints for each worker where few are simulated beside a file: two for each lane."""
 SOME, READ = 64, 4096
 """Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
 
@@ -138,12 +140,13 @@ def simulate_pending(
                 pace.note(len(done.slots), result.seconds, time.perf_counter() - begin)
 
 
-def simulate_beside(params: NDArray[np.void], options: Options, mechanism: Mechanism) -> Simulation:
-    """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
+def simulate_beside(params: NDArray[np.void], options: Options, mechanism: Mechanism, workers: int = 1) -> Simulation:
+    """Simulate joints, (m,) table PARAM, in workers and without histories; those that crash get no results."""
     compile_missing(mechanism, options)
     results = without_results(len(params), Status.PENDING, mechanism)
-    whole = Block("", np.arange(len(params)), params, options, mechanism)
-    with closing(pool.map_blocks(work_beside(mechanism, options), [whole], 1)) as done:
+    shares = np.array_split(np.arange(len(params)), max(1, min(workers, len(params) // MIN_BESIDE)))
+    blocks = [Block("", slots, params[slots], options, mechanism) for slots in shares]
+    with closing(pool.map_blocks(work_beside(mechanism, options), blocks, len(blocks))) as done:
         for block, result in done:
             results[block.slots] = results_of(block, result)
     return Simulation(results, {})

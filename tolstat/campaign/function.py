@@ -6,6 +6,7 @@ import math
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -24,7 +25,7 @@ from tolstat.common.tables import Options
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
-from tolstat.study import Study, axes
+from tolstat.study import Study, axes, load
 from tolstat.study.selection import error_units, select, suggestion
 
 if TYPE_CHECKING:
@@ -268,14 +269,14 @@ class Function:
 
 
 def function(
-    study: Study, loads: Sequence[str] | None = None, *, point: str = "", workers: int | None = None
+    study: Study | str | Path, loads: Sequence[str] | None = None, *, point: str = "", workers: int | None = None
 ) -> Function:
     """Loads of the joints of a study as a function of their errors, for other tools.
 
     Parameters
     ----------
-    study : Study
-        Study with tolerances, a sweep or listed joints; how it samples is left to the other tool.
+    study : Study, str or Path
+        Study, or its TOML file, with tolerances, a sweep or listed joints; how it samples is left to the other tool.
     loads : sequence of str, optional
         Names of loads or patterns such as ``cross*.F``; by default those with limits, without limits those of reports.
     point : str
@@ -290,8 +291,9 @@ def function(
     Raises
     ------
     InputError
-        When a load or the point is unknown.
+        When a load or the point is unknown, or with the faults of the file.
     """
+    study = study if isinstance(study, Study) else load(study)
     faults = []
     chosen: dict[str, None] = {}
     every = list(units_of_loads(study.mechanism))

@@ -104,6 +104,6 @@ def _by_position(values: Any, needed: Sequence[str], attribute: str) -> list[Arr
     table = np.asarray(values, float)
     if table.ndim != 2 or table.shape[1] != len(needed):
         wanted = f"(n, {len(needed)}), a row for each joint and a column for each of f.{attribute}"
-        remedy = "give [x] for one joint" if table.shape == (len(needed),) else f"they are {', '.join(needed)}"
-        raise ValueError(f"an array of shape {wanted} is needed, not {table.shape}; {remedy}")
+        remedy = "; give [x] for one joint" if table.shape == (len(needed),) else ""
+        raise ValueError(f"an array of shape {wanted} is needed, not {table.shape}{remedy}")
     return [np.ascontiguousarray(column) for column in table.T]

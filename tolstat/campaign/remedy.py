@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -56,12 +56,9 @@ class Reason(NamedTuple):
     point: str = ""
 
     @property
-    def text(self) -> str:
-        """Number, status, meaning and remedy, in lines."""
-        noun = "joint" if self.joints == 1 else "joints"
-        where = f" at {self.point}" if self.point else ""
-        head = f"{self.joints} {noun} {self.status.label}{where}: {tables.STATUS_TEXT[self.status]}"
-        return f"{head}\n  hint, for row {self.row}: {self.remedy}"
+    def where(self) -> str:
+        """Operating point in words, where the campaign has several."""
+        return f" at {self.point}" if self.point else ""
 
     @property
     def retry(self) -> str:
@@ -90,6 +87,20 @@ def reasons(store: Reader, status: Mapping[str, NDArray[np.uint8]]) -> list[Reas
             row = store.at(point).results(slice(first, first + 1))[0]
             each.append(Reason(Status(state), len(slots), joint, remedy(row, store.options), point))
     return sorted(each, key=lambda reason: -reason.joints)
+
+
+def in_words(reasons: Sequence[Reason]) -> Iterator[str]:
+    """Say why joints have no valid load: numbers, meaning and remedies of each status, in lines, each once."""
+    for status in dict.fromkeys(reason.status for reason in reasons):
+        first, *others = [reason for reason in reasons if reason.status == status]
+        noun = "joint" if first.joints == 1 else "joints"
+        counts = [f"{first.joints} {noun} {status.label}{first.where}"]
+        counts += [f"{other.joints}{other.where}" for other in others]
+        rows = {first.remedy: first}
+        for other in others:
+            rows.setdefault(other.remedy, other)
+        hints = [f"  hint, for row {each.row}{each.where}: {remedy}" for remedy, each in rows.items()]
+        yield "\n".join([f"{', '.join(counts)}: {tables.STATUS_TEXT[status]}", *hints])
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:

@@ -243,7 +243,7 @@ def replay(store: Reader, row: int) -> Replay:
     if stored["status"][0] == Status.PENDING:
         raise input_error(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")
     params = parameters(store, np.array([here.start]))
-    options = options_of(store, here.start)
+    options = options_of(store, here.start, int(store.attempt(here)[0]))
     simulation, wall_s = _timed(params, options, store.mechanism)
     result = CaseResult(simulation, params, wall_s, options, store.mechanism)
     differences = []

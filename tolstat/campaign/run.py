@@ -19,6 +19,7 @@ from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simu
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
+from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError, input_error
 from tolstat.common.tables import Simulation, Status
@@ -206,7 +207,7 @@ def run(
                 counts = _write_blocks(store, finished, counts, progress or None, tell)
             if check:
                 stage("check of the numerical error")
-                verify.check_few(store)
+                verify.check_few(store, workers or available_cores())
             store.finish()
         except KeyboardInterrupt:
             raise Interrupted(path, store.counts(), stop.number) from None

@@ -183,14 +183,15 @@ def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> 
 
 def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
-    options = [options_of(store, slot) for slot in slots.tolist()]
+    attempts = pick(store.attempt, slots)
+    options = [options_of(store, *of_joint) for of_joint in zip(slots.tolist(), attempts.tolist(), strict=True)]
     checks = make(parameters(store, slots), options, store.mechanism)
     for check in checks.values():
         blank_others(check.results, store.columns, store.mechanism)
     return Verification(seed, store.row(slots), pick(store.results, slots), checks)
 
 
-def check_few(store: Writer) -> None:
+def check_few(store: Writer, workers: int) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
     Does nothing if the file is a slice, and leaves checks that it has as they are.
@@ -198,18 +199,18 @@ def check_few(store: Writer) -> None:
     parts = list[tuple[Writer, str, Verification]]()
     for at_point in store.each() if store.whole else ():
         if at_point.complete and verification.read(at_point) is None:
-            parts += [(at_point, name, part) for name, part in _check_few(at_point).items()]
+            parts += [(at_point, name, part) for name, part in _check_few(at_point, workers).items()]
     if parts:
         verification.write(parts)
 
 
-def _check_few(store: Reader) -> dict[str, Verification]:
+def _check_few(store: Reader, workers: int) -> dict[str, Verification]:
     """Checks of the joints of `chosen.quick`, simulated in lanes together, by name of the group."""
     at_random, near = chosen.quick(store)
     slots = np.union1d(at_random, near)
     if not slots.size:
         return {}
-    make = partial(run_checks, names=QUICK_CHECKS)
+    make = partial(run_checks, names=QUICK_CHECKS, simulate=partial(simulate_beside, workers=workers))
     checked = check_slots(store, slots, int(store.sampling["seed"]), make)
     groups = {verification.VERIFY: at_random, verification.NEAR: near}
     return {name: checked.only(np.isin(slots, of_group)) for name, of_group in groups.items() if of_group.size}

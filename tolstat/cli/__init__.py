@@ -6,6 +6,8 @@ Functions of questions are made by `_command`, those of the other commands from 
 from __future__ import annotations
 
 import gc
+import io
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated, Any
@@ -129,6 +131,9 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line; the entry point of ``tolstat`` and ``python -m tolstat``."""
     limit_threads()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # of characters that its encoding does not have
     gc.disable()  # until the command begins: the search for garbage among new modules finds none and takes time
     app(prog_name="tolstat")
 

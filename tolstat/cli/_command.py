@@ -1,5 +1,7 @@
 """The one place that makes commands of functions: arguments and options from a signature, help from its docstring.
 
+Under ``python -OO`` there are no docstrings: commands run, and their help has no texts.
+
 Parameters that can be given by position are arguments, keyword-only ones are options; what a type does not say of them
 is their `Opt`. A parameter that is true by default can be switched off: ``--report / --no-report``.
 
@@ -269,7 +271,7 @@ def function_of(question: Question) -> Callable[..., None]:
     parameters = [_parameter(name, kind, Parameter.empty) for name, kind in READS[reads].items()]
     for p in (*options_of_answer, *only_simulated):
         base, opt = opt_of(p)
-        parameters.append(_parameter(p.name, Annotated[base, opt._replace(help=texts[p.name])], p.default))
+        parameters.append(_parameter(p.name, Annotated[base, opt._replace(help=texts.get(p.name, ""))], p.default))
     for name, (annotation, default, applies) in {
         "point": (options.Point, None, reads != "pair"),
         "study_file": (options.OtherStudy, None, reads != "pair"),

@@ -39,6 +39,8 @@ def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     """
     texts = {name: _plain(file.read_text(encoding="utf-8")) for name, file in pages().items()}
     kinds = {f"{kind}.schema.json": kind for kind in schemas.KINDS}
+    if page in kinds and sys.flags.optimize > 1:
+        raise input_error("python -OO", "leaves out the texts of the schema", "print it without -OO")
     if page in kinds:
         print_json(schemas.schema(kinds[page]))
     elif page is not None and page_name(page) in texts:

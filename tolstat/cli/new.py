@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -59,6 +60,8 @@ def new(
     """
     path = name if name.suffix.lower() == ".toml" else name.with_name(f"{name.name}.toml")
     faults: list[Fault] = []
+    if sys.flags.optimize > 1:
+        faults.append(Fault("python -OO", "leaves out the texts of the comments", "write studies without -OO"))
     if signal is None and any(value is not None for value in (alpha, base, exponent)):
         faults.append(Fault("--alpha, --base, --exponent", "are about a measured signal", "give it, too: --signal CSV"))
     if signal is not None and joint is not None:

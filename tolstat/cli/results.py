@@ -61,7 +61,7 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         shares = [row for table in tables[:1] for row in table.rows]
         print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
-    typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in reasons)]))
+    typer.echo("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))]))
     for table in tables[:1]:
         typer.echo()
         print_table(table.columns, table.for_people, wide)

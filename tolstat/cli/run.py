@@ -248,8 +248,8 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
                 answer = library.reports.report(store.view())
             deliver(answer, wide, stem=path.with_suffix(""))
         without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
-        for reason in without_load:
-            say(reason.text)
+        for text in library.remedy.in_words(without_load):
+            say(text)
         for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):
             say(f"again: tolstat run {study_file} --out {path} {options}")
         source, csv, page = (quote(str(name)) for name in (path, path.with_suffix(".csv"), path.with_suffix(".html")))

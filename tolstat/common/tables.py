@@ -21,7 +21,7 @@ from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
 from tolstat.common.mechanism import Mechanism, features, prefixes
 from tolstat.common.parameters import numbers, param_fields
 
-SCHEMA_VERSION = 13
+SCHEMA_VERSION = 14
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""

@@ -244,6 +244,8 @@ def _notes(rows: Rows) -> Iterator[str]:
         yield f"{of}: in the intervals of yield and ppm both ways, in no Cpk"
         if any(math.isnan(row["cpk"]) for row in rows):
             yield "no Cpk where joints without a valid load make a share as uncertain as sampling does"
+    if any(math.isnan(row["cpk_lower"]) and not math.isnan(row["cpk"] + row["ppm_lower"]) for row in rows):
+        yield "no interval of Cpk where the intervals of median and 99.865 % quantile overlap: too few joints"
     if any(row["cpk_lower"] == 0 for row in rows):
         yield f"lower ends of Cpk need {first['needed']} valid joints"
     if any(row["normal_p"] < NOT_NORMAL for row in rows):

@@ -156,8 +156,10 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         if view.method not in DRAWN:
             remedy = 'compare files of studies with sampling.method "random", "sobol" or "lhs"'
             raise inapplicable(view, "holds joints that are not drawn from tolerances", remedy)
-    limits = list(dict.fromkeys([*a.limits.items(), *b.limits.items()]))
+    common, limits = _common(a, b), list(dict.fromkeys([*a.limits.items(), *b.limits.items()]))
     names, both = _names(a, b, by or (), [name for name, _ in limits]), sides(a, b)
+    apart = [name for name, _ in limits if split(name)[0] not in common]
+    limits = [(name, level) for name, level in limits if name not in apart]
     try:
         rows = [_share(both, *limit) for limit in [*limits, *([(ANY_LIMIT, 1.0)] if a.limits and b.limits else [])]]
         loads = [row for name in names for row in _statistics(both, name)]
@@ -173,7 +175,7 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
         Table("switched", "Pairs with one joint above a limit", (), switched),
         Table("changes", "Differences between the studies", (), keys),
-        *map(Sentence, _notes(both, differing, len(switched))),
+        *map(Sentence, _notes(both, differing, len(switched), apart)),
     ]
     return Answer("compare", "Two campaigns side by side", parts, {"paired": both.paired})
 
@@ -211,15 +213,19 @@ def sides(a: View, b: View) -> Sides:
 
 
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
-    """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
-    common = [name for name in a.kept_loads if name in b.kept_loads]
-    asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
+    """Loads whose quantiles and means are compared, which both files keep: those asked for, else those with limits."""
+    common, asked = _common(a, b), dict.fromkeys(by, "--by") or {name: f"limits.{name}" for name in limited}
     raise_all(
         Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(split(name)[0], common))
         for name, option in asked.items()
         if split(name)[0] not in common
     )
     return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in common]
+
+
+def _common(a: View, b: View) -> list[str]:
+    """Loads that both files keep."""
+    return [name for name in a.kept_loads if name in b.kept_loads]
 
 
 def _share(both: Sides, name: str, level: float) -> Row:
@@ -244,7 +250,9 @@ def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
         yield {"row": row, "load": name, "unit": loads[0].unit, "level": level, "a": of_a, "b": of_b}
 
 
-def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switched: int) -> Iterator[str]:
+def _notes(
+    both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switched: int, apart: Sequence[str]
+) -> Iterator[str]:
     """Differences between the studies, numbers of joints, and what the intervals leave out."""
     for side, view in zip("AB", both.views, strict=True):
         yield f"{side}: {view.path}"
@@ -253,6 +261,8 @@ def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switche
         yield f"  {keys[0]}{more}: {_in_words(of_a)} -> {_in_words(of_b)}"
     if not differing:
         yield "  the studies are the same"
+    if apart:
+        yield f"limits left out: {', '.join(apart)}, which only one file keeps"
     a, b = map(len, both.samples)
     if both.paired:
         yield f"{a} pairs of joints with the same random numbers"

@@ -11,10 +11,11 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+from h5py import h5d
 from numpy.typing import NDArray
 
 from tolstat.store import layout
@@ -65,16 +66,24 @@ class CheckedFile:
         self.file = file
         self.stored = {stored.path: stored for stored in layout.datasets(metadata)}
         self._index = {path: k for k, path in enumerate(self.stored)}
-        self._datasets: dict[str, h5py.Dataset] = {}
+        self._datasets: dict[str, h5d.DatasetID] = {}
         self._known: dict[tuple[str, ...], NDArray[np.uint8]] = {}
         self._number = -1
 
-    def dataset(self, path: str) -> h5py.Dataset:
-        """Look up a dataset with a row for each joint; its type and shape must be those that the metadata imply."""
+    def read(self, path: str, begin: int, end: int) -> NDArray[Any]:
+        """Read rows of a dataset with a row for each joint, (end - begin, ...)."""
+        stored = self.stored[path]
+        values = np.empty((max(0, end - begin), *stored.shape[1:]), stored.dtype)
+        with told_as_damage(self.path):
+            read_rows(self._dataset(path), begin, values)
+        return values
+
+    def _dataset(self, path: str) -> h5d.DatasetID:
+        """Look up a dataset; its type and shape must be those that the metadata imply."""
         dataset = self._datasets.get(path)
         if dataset is None:
             with told_as_damage(self.path):
-                dataset, stored = self.file[path], self.stored[path]
+                dataset, stored = h5d.open(self.file.id, path.encode()), self.stored[path]
                 if dataset.shape != stored.shape or dataset.dtype != stored.dtype:
                     expected = f"{stored.shape} of {stored.dtype}"
                     raise ValueError(f"{path} is {dataset.shape} of {dataset.dtype}, not {expected}")
@@ -112,7 +121,7 @@ class CheckedFile:
     def _differ(self, paths: Sequence[str], blocks: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Whether datasets do not match their checksums, (paths, blocks)."""
         for path in paths:
-            self.dataset(path)
+            self._dataset(path)
         with told_as_damage(self.path):
             written = self.file[GROUP]["crc"][:, blocks[0] : blocks[-1] + 1][[self._index[path] for path in paths]]
             actual = computed(self.file, [self.stored[path] for path in paths], blocks)
@@ -169,10 +178,10 @@ def _of_run(file: h5py.File, stored: Stored, first: int, last: int) -> list[int]
     n, stop = stored.shape[0], min(last * ROWS, stored.shape[0])
     # a power of two, as ROWS: one divides the other
     step = 1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
-    checksums, crc = [], 0
+    dataset, checksums, crc = h5d.open(file.id, stored.path.encode()), [], 0
     for begin in range(first * ROWS, stop, step):
         values = np.empty((min(step, stop - begin), *stored.shape[1:]), stored.dtype)
-        read_rows(file, stored.path, begin, values)
+        read_rows(dataset, begin, values)
         for start in range(begin, begin + len(values), ROWS):
             if start % ROWS == 0:
                 shape = (min(start + ROWS, n) - start, *stored.shape[1:])

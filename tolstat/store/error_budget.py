@@ -62,13 +62,14 @@ def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     view, name = view.narrowed(load.name)
     if len(view.parts) > 1:
         return _together(load, (near(part, _at(part, name, load)) for part in view.parts))
-    if view.near is None:
+    if (verified := view.near) is None:
         return None
-    checks = {name: check.results for name, check in view.near.checks.items()}
+    checks = {name: check.results for name, check in verified.checks.items()}
+    lacking = view.kept(corrections, lambda: frozen(corrections(verified.base, checks, view.mechanism)))
     distance = np.abs(load.values - load.limit)
     nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
     number = observables(view.mechanism).index(name)
-    missing = corrections(view.near.base, checks, view.mechanism)[np.isin(view.near.rows, nearest), number]
+    missing = lacking[np.isin(verified.rows, nearest), number]
     missing = missing[np.isfinite(missing)]
     if missing.size < LEAST_NEAR:
         return None

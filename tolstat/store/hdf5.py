@@ -155,9 +155,8 @@ def replace(path: Path, file: h5py.File, change: Callable[[h5py.File], None], gr
     return copy
 
 
-def read_rows(file: h5py.File, path: str, first: int, values: NDArray[Any]) -> None:
+def read_rows(dataset: h5d.DatasetID, first: int, values: NDArray[Any]) -> None:
     """Fill `values`, (m, ...), with rows of a dataset from `first` on; calls HDF5 directly, as `put` does."""
-    dataset = h5d.open(file.id, path.encode())
     there = dataset.get_space()
     there.select_hyperslab((first, *(0,) * (values.ndim - 1)), values.shape)
     dataset.read(h5s.create_simple(values.shape), there, values)

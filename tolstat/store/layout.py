@@ -187,7 +187,6 @@ def create_table(
     n: int,
     blocks: Iterable[NDArray[np.void]] | None = None,
     codes: Mapping[str, Mapping[int, str]] | None = None,
-    scale: h5py.Dataset | None = None,
 ) -> None:
     """Create a table: one contiguous dataset per column, which can be overwritten in place.
 
@@ -205,13 +204,10 @@ def create_table(
         Values, in consecutive blocks of rows; without them floats are NaN and integers 0.
     codes : mapping, optional
         Meanings of the columns that hold codes, by name; `MEANINGS` without it.
-    scale : h5py.Dataset, optional
-        Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    group = _linked(holder, name, LINKED if scale is None else (scale.name,))
-    row = scale or holder.file["row"]
+    group = _linked(holder, name)
     for c in columns:
-        _create(group, c.name, (n,), c, row, codes or MEANINGS, blocks is None)
+        _create(group, c.name, (n,), c, holder.file["row"], codes or MEANINGS, blocks is None)
     first = 0
     for block in blocks or ():
         put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})
@@ -220,11 +216,11 @@ def create_table(
         raise ValueError(f"{first} rows of {name} given, {n} expected")
 
 
-def _linked(holder: h5py.Group, name: str, links: Iterable[str] = LINKED) -> h5py.Group:
-    """Create a group with links to datasets of the file."""
+def _linked(holder: h5py.Group, name: str) -> h5py.Group:
+    """Create a group with links to `LINKED` datasets of the file."""
     group = holder.create_group(name)
-    for link in links:
-        group[link.rpartition("/")[2]] = holder.file[link]
+    for link in LINKED:
+        group[link] = holder.file[link]
     return group
 
 

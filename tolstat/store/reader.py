@@ -339,12 +339,10 @@ class Reader:
     def column(self, group: str, name: str, slots: slice) -> NDArray[Any]:
         """Read a slice of file slots of a dataset: of results as they are, `StoreError` for others that are damaged."""
         path = layout.path_of(self._point() if group in layout.AT_POINTS else "", group, name)
+        first, last, _ = slots.indices(self.n)
         if group not in ("results", "ledger"):
-            first, last, _ = slots.indices(self.n)
             self._refuse(path, self._checked.damaged((path,), first, last))
-        dataset = self._checked.dataset(path)
-        with told_as_damage(self.path):
-            return np.asarray(dataset[slots])
+        return self._checked.read(path, first, last)
 
     def group(self, name: str, at_point: bool = True) -> h5py.Group | None:
         """Group that a file may have beside its tables, at the operating point or in the whole file."""

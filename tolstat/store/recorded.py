@@ -57,15 +57,14 @@ def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDA
     return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
 
 
-def options_of(store: Reader, row: int) -> Options:
-    """Solver options of file slot `row`: the study's, its variant's, or those of its last retry.
+def options_of(store: Reader, row: int, attempt: int) -> Options:
+    """Solver options of file slot `row` in its `attempt`: the study's, its variant's, or those of that retry.
 
     Raises
     ------
     InputError
         When the settings of the variant cannot be used.
     """
-    attempt = int(store.attempt(slice(row, row + 1))[0])
     changed = {key: value for key, value in _values(store, row).items() if key.startswith("solver.")}
     if changed and not attempt:
         written = {key: value for key, value in store.identity.items() if key.startswith("solver.")} | changed

@@ -218,7 +218,7 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     apart = np.zeros(len(slots))
     for attempt in np.unique(attempts):
         here = np.flatnonzero(attempts == attempt)
-        options = options_of(store, int(slots[here[0]]))
+        options = options_of(store, int(slots[here[0]]), int(attempt))
         again = simulate_rows(params[here], options, mechanism=store.mechanism, histories="full")
         for name, values in loads.items():
             samples = again.histories[name]

@@ -74,18 +74,13 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         return None
     again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
     with told_as_damage(store.path, "is damaged: its verification cannot be used", f"make it anew: {again}"):
-        rows = np.asarray(group["rows"][:], np.intp)
-        checks = {}
+        rows, seed, stored = np.asarray(group["rows"][:], np.intp), int(group.attrs["seed"]), dict[str, _Stored]()
         for check in text(group.attrs, "checks").split():
-            table = np.empty(len(rows), tables(store.mechanism).RESULT)
-            blank_others(table, store.columns, store.mechanism)
-            for c in store.columns:
-                c.of(table)[:] = group[check][c.name][:]
             attrs = group[check].attrs
-            checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-        seed = int(group.attrs["seed"])
-        if text(group.attrs, CHECKSUM) != _checksum(seed, rows, checks, store.columns):
+            stored[check] = _Stored(text(attrs, "description"), text(attrs, "options"), group[check][:])
+        if text(group.attrs, CHECKSUM) != _checksum(seed, rows, stored):
             raise ValueError("its values do not match their checksum")
+        checks = {check: held.check(store) for check, held in stored.items()}
         return Verification(seed, rows, pick(store.results, np.asarray(store.slot(rows))), checks)
 
 
@@ -94,14 +89,32 @@ def read_each(stores: Sequence[Reader], name: str) -> list[Verification]:
     return [found for store in stores if (found := read(store, name)) is not None]
 
 
-def _checksum(seed: int, rows: NDArray[np.intp], checks: dict[str, Check], columns: Sequence[Column]) -> str:
-    """SHA-256 of the rows of a verification and of the results of its checks, names and descriptions included."""
+class _Stored(NamedTuple):
+    """A check as the file has it: options as JSON, and the columns kept as floats, (m, columns)."""
+
+    description: str
+    options: str
+    values: NDArray[np.float64]
+
+    def check(self, store: Reader) -> Check:
+        results = np.empty(len(self.values), tables(store.mechanism).RESULT)
+        blank_others(results, store.columns, store.mechanism)
+        for column, values in zip(store.columns, self.values.T, strict=True):
+            column.of(results)[:] = values
+        return Check(self.description, json.loads(self.options), results)
+
+
+def _stored(check: Check, columns: Sequence[Column]) -> _Stored:
+    values = np.column_stack([column.of(check.results).astype("f8") for column in columns])
+    return _Stored(check.description, json.dumps(check.options, allow_nan=False), values)
+
+
+def _checksum(seed: int, rows: NDArray[np.intp], stored: dict[str, _Stored]) -> str:
+    """SHA-256 of the rows of a verification and of its checks, names and descriptions included."""
     digest = hashlib.sha256(rows.astype("i8").tobytes())
-    digest.update(f"{seed} {' '.join(checks)}".encode())
-    for name, check in checks.items():
-        digest.update(f"{name} {check.description} {json.dumps(check.options, allow_nan=False)}".encode())
-        for c in columns:
-            digest.update(c.name.encode() + c.of(check.results).astype(c.dtype).tobytes())
+    digest.update(f"{seed} {' '.join(stored)}".encode())
+    for name, check in stored.items():
+        digest.update(f"{name} {check.description} {check.options}".encode() + check.values.tobytes())
     return digest.hexdigest()
 
 
@@ -136,12 +149,15 @@ def write(parts: Sequence[tuple[Writer, str, Verification]]) -> None:
             checks = " ".join(verification.checks)
             put_attributes(group, {"description": about, "seed": verification.seed, "checks": checks})
             about = "rows of the joints in the campaign, counted from 0"
-            rows = put_scale(group, "rows", verification.rows.astype("i8"), "1", about)
-            for check_name, check in verification.checks.items():
-                layout.create_table(group, check_name, store.columns, len(rows), [check.results], scale=rows)
-                options = json.dumps(check.options, allow_nan=False)
-                put_attributes(group[check_name], {"description": check.description, "options": options})
-            checksum = _checksum(verification.seed, verification.rows, verification.checks, store.columns)
-            put_attributes(group, {CHECKSUM: checksum})
+            axes = [put_scale(group, "rows", verification.rows.astype("i8"), "1", about)]
+            names = np.array([column.name for column in store.columns], dtype=object)
+            axes.append(put_scale(group, "column", names, "1", "columns of the results"))
+            stored = {check: _stored(made, store.columns) for check, made in verification.checks.items()}
+            for check, held in stored.items():
+                dataset = group.create_dataset(check, data=held.values)
+                for axis, scale in zip(dataset.dims, axes, strict=True):
+                    axis.attach_scale(scale)
+                put_attributes(dataset, {"description": held.description, "options": held.options})
+            put_attributes(group, {CHECKSUM: _checksum(verification.seed, verification.rows, stored)})
 
     parts[0][0].replace(change)

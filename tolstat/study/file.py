@@ -185,7 +185,8 @@ def _check_sections(file: Reading, sampling: Sampling) -> None:
 
 def _check_method(file: Reading, sampling: Sampling) -> None:
     """Note keys that the sampling method needs or does not use."""
-    if sampling.joints_per_lot > 1 and not file.scatter.lots:
+    written = (entry.value for entry in file.entries("tolerances") if isinstance(entry.value, Mapping))
+    if sampling.joints_per_lot > 1 and not any("lot" in keys for keys in written):
         remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
         file.fault("sampling.joints_per_lot", "has no effect: no tolerance has a lot", remedy)
     if sampling.method == "cases" and file.data.get("limits"):

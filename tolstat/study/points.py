@@ -273,10 +273,19 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
         yield "'ideal' does not hold for a drive shaft: its closed forms are those of one joint", remedy
 
 
+def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
+    """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
+    if not any(setting.joint.shaft.slides for setting in settings):
+        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
+            yield path, "has no effect: the output shaft is rigid along its axis", remedy
+
+
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
-    Of drive shafts, refuse what only one joint can have, and what holds no tube.
+    Of drive shafts, refuse what only one joint can have, and what holds no tube. For forces see `idle_forces`.
 
     Parameters
     ----------
@@ -291,11 +300,6 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         Key path, what was found, remedy.
     """
     of_shafts = [setting for setting in settings if isinstance(setting.operation, OperationOfShaft)]
-    if not any(setting.joint.shaft.slides for setting in settings):
-        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
-        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
-            yield path, "has no effect: the output shaft is rigid along its axis", remedy
     for key in ("speed", "torque"):
         if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"

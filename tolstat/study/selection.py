@@ -79,12 +79,15 @@ def joints(mechanism: Mechanism) -> set[str]:
 
 
 def entries(table: Mapping[str, Any], mechanism: Mechanism, *section: int | str) -> Iterator[Entry]:
-    """Entries of the table at the key path `section` whose keys are names, written quoted or dotted."""
+    """Entries of the table at the key path `section` whose keys are names, written quoted or dotted.
+
+    A table with ``distribution`` is itself an entry, of ``[tolerances]``, whose name lacks its second half.
+    """
     for key, value in table.items():
         if key in joints(mechanism) and isinstance(value, Mapping):
             for entry in entries(value, mechanism, *section, key):
                 yield entry._replace(pattern=f"{key}.{entry.pattern}")
-        elif key.isidentifier() and isinstance(value, Mapping):
+        elif key.isidentifier() and isinstance(value, Mapping) and "distribution" not in value:
             for name, inner in value.items():
                 yield Entry(f"{key}.{name}", (*section, key, name), inner)
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -134,8 +134,10 @@ class Study:
         (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
         return lined
 
-    def check_mounting(self) -> None:
+    def check_mounting(self, idle_forces: bool = False) -> None:
         """Refuse settings without effect, see `points.refusals`, and deviations that make friction negative.
+
+        With `idle_forces` axial forces without effect are accepted.
 
         Raises
         ------
@@ -143,7 +145,15 @@ class Study:
             With every such setting.
         """
         refused = [*points.refusals(self._settings, self._varied), *self._negative_friction()]
-        raise_all([self.fault(dotted(path), *texts) for path, *texts in refused])
+        raise_all([*([] if idle_forces else self.idle_forces), *self._faults(refused)])
+
+    @property
+    def idle_forces(self) -> list[Fault]:
+        """Axial forces, and their scatter, without effect, see `points.idle_forces`."""
+        return self._faults(points.idle_forces(self._settings, self._varied))
+
+    def _faults(self, refused: Iterable[tuple[KeyPath, str, str]]) -> list[Fault]:
+        return [self.fault(dotted(path), *texts) for path, *texts in refused]
 
     def _negative_friction(self) -> Iterator[tuple[KeyPath, str, str]]:
         """Deviations that take the friction of a joint below zero, as `points.refusals` yields what it refuses."""

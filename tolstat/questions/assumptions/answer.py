@@ -110,7 +110,8 @@ def _answer(view: View, standing: variations.Standing) -> Answer:
         "without the numerical error; a verdict turns if the interval of the share lies on the other side of the "
         "accepted share, and that of the change excludes zero"
     )
-    notes = (intervals, sentences.not_varied(standing, view.path.name), sentences.more(standing, view.path.name))
+    idle = sentences.idle(standing)
+    notes = (intervals, idle, sentences.not_varied(standing, view.path.name), sentences.more(standing, view.path.name))
     table = Table("assumptions", title, COLUMNS, standing.rows, _UNITS)
     facts: dict[str, Any] = {"n": standing.n, "confidence": standing.confidence}
     facts |= dict(zip(("share", "lower", "upper"), standing.drawn, strict=True))
@@ -207,8 +208,9 @@ def simulate(
         sets.check_code(store)
         singles, study, n = variations.singles(view.study), view.study, joints
         if not singles:
-            remedy = "write [[assumed]] in the study, with name, values and because: tolstat docs study"
-            raise unusable(view, "has a joint of which nothing is assumed that is varied", remedy)
+            found = "lists no other values to try: neither the study nor its joint file has [[assumed]] with any"
+            remedy = "write [[assumed]] with name, values and because in the study, see tolstat docs study"
+            raise unusable(view, found, f"{remedy}, and run it again, which simulates nothing anew")
         if joints <= variations.JOINTS:
             n = min(joints, variations.joints_of(view))
         simulation, begin, labels = Simulation(store, view, work, view.limits), time.monotonic(), set[str]()

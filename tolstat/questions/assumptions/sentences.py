@@ -125,6 +125,14 @@ def not_varied(standing: Standing | None, file: str) -> str:
     return f"{what} not varied: tolstat assumptions {file} --run"
 
 
+def idle(standing: Standing) -> str:
+    """Sentence on variations in which the axial force of the study has no effect; empty if there are none."""
+    if not standing.idle:
+        return ""
+    without = "simulated without operation.axial_force and its tolerance"
+    return f"{_listed(standing.idle)}: {without}, which do nothing to an output shaft that is rigid along its axis"
+
+
 def still(standing: Standing) -> str:
     """Sentence on what moves nothing; empty if all that is assumed does."""
     parts = []

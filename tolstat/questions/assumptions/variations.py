@@ -19,7 +19,7 @@ from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
-from tolstat.study.assumptions import Assumption, assumptions, given, is_drawn, together
+from tolstat.study.assumptions import Assumption, assumptions, given, is_drawn, together, with_value
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -93,6 +93,8 @@ class Standing:
         Names of assumptions of the joint file that the study gives.
     without_other : tuple of str
         Names of assumptions of which only the values as drawn are listed.
+    idle : tuple of str
+        Labels of the variations on which the axial forces of the study have no effect.
     """
 
     n: int
@@ -106,6 +108,7 @@ class Standing:
     fixed: tuple[Assumption, ...]
     given: tuple[str, ...] = ()
     without_other: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
 
     @property
     def turning(self) -> list[Row]:
@@ -182,8 +185,9 @@ def _evaluate(view: View, accepted: float) -> Standing:
     fixed = tuple(assumption for assumption in assumptions(study) if not assumption.varied)
     others = {variation.name for variation in singles(study)}
     drawn_only = tuple(each.name for each in assumptions(study) if each.varied and each.name not in others)
+    idle = tuple(variation.label for variation, _ in simulated if with_value(study, variation.keys).idle_forces)
     n = min((len(loads) for _, loads in simulated), default=0)
-    return Standing(n, confidence, accepted, drawn, side, rows, names, missing, fixed, given(study), drawn_only)
+    return Standing(n, confidence, accepted, drawn, side, rows, names, missing, fixed, given(study), drawn_only, idle)
 
 
 def applicable(view: View, accepted: float = np.nan) -> Standing | None:

@@ -24,6 +24,7 @@ from tolstat.study import changes
 from tolstat.study.assumptions import assumptions
 from tolstat.study.points import Point
 
+WEIBULL = 9 / 8
 BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "100 h"}
 
 
@@ -57,10 +58,22 @@ def view(of_study):
 
 
 def test_each_bearing_swings_by_the_misalignment_of_its_joint(view):
-    """Twice the angle is half the life."""
-    hours = lives_of(view()).hours
-    assert hours.shape == (39, 9)
+    """Twice the angle is half the life; joints and shaft last until the first of their bearings fails."""
+    lives = lives_of(view())
+    hours = lives.hours
+    assert lives.places[8:] == ("joint1", "joint2", "shaft")
     np.testing.assert_allclose(hours[:, :4], 2.0 * hours[:, 4:8], rtol=1e-12)
+    for place, bearings in ((8, slice(0, 4)), (9, slice(4, 8)), (10, slice(0, 8))):
+        together = (hours[:, bearings] ** -WEIBULL).sum(axis=1) ** (-1.0 / WEIBULL)
+        np.testing.assert_allclose(hours[:, place], together, rtol=1e-12)
+
+
+def test_a_bearing_swings_by_the_misalignment_of_its_own_shaft(view):
+    """The deviation of joint 2's misalignment counts: half the angle is twice the life."""
+    plain, straighter = view(), view()
+    straighter.store._errors["shaft.alpha"] = np.radians(-15.0)
+    np.testing.assert_allclose(lives_of(straighter).hours[:, 4:8], 2.0 * lives_of(plain).hours[:, 4:8], rtol=1e-12)
+    np.testing.assert_allclose(lives_of(straighter).hours[:, :4], lives_of(plain).hours[:, :4], rtol=1e-12)
 
 
 def test_a_pair_has_no_rating_where_one_of_its_bearings_frets(view):

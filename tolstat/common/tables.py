@@ -229,20 +229,15 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
-    if mechanism.is_shaft:
-        fields += [
-            Field("shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
-            Field("shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
-        ]
-    if mechanism.has_spline:
-        fields.append(Field("operation.spline", "1", "force of the spline that friction holds, over the largest"))
-    if mechanism.unbalance:
-        fields += [
-            Field("shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
-            Field("shaft.unbalance_angle", "rad", "deviation of its direction"),
-        ]
-    if mechanism.friction:
-        fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
+    of_parts = (
+        (mechanism.is_shaft, "shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
+        (mechanism.is_shaft, "shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
+        (mechanism.has_spline, "operation.spline", "1", "force of the spline that friction holds, over the largest"),
+        (mechanism.unbalance, "shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
+        (mechanism.unbalance, "shaft.unbalance_angle", "rad", "deviation of its direction"),
+        (mechanism.friction, "friction.mu", "1", "deviation of the coefficient of friction"),
+    )
+    fields += [Field(name, unit, text) for there, name, unit, text in of_parts if there]
     for prefix in prefixes(mechanism) if mechanism.faces else ():
         fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
     return tuple(fields)

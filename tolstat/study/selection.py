@@ -287,10 +287,9 @@ class Reading:
         if "file" in self.text:
             self.text, self.parts["signals"] = signals.replaced(self.text, self.data, path, self.faults)
             self.data = read_toml(path, self.text)
-        allowed = list(sections)
         for key in self.data:
-            if key not in allowed:
-                self.fault(key, "unknown key", did_you_mean(key, allowed))
+            if key not in sections:
+                self.fault(key, "unknown key", did_you_mean(key, list(sections)))
 
     def __getattr__(self, name: str) -> Any:
         return self.parts.get(name)
@@ -298,9 +297,8 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint, shaft, base = self.parts.get("joint"), self.data.get("shaft"), CARDAN
-        if shaft is not None:
-            base = SPLINED if isinstance(shaft, dict) and "spline" in shaft else SHAFT
+        joint, shaft = self.parts.get("joint"), self.data.get("shaft")
+        base = CARDAN if shaft is None else SPLINED if isinstance(shaft, dict) and "spline" in shaft else SHAFT
         return MECHANISMS[named(base, joint.parts if joint else PARTS)]
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:

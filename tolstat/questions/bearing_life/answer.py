@@ -104,12 +104,13 @@ def bearing_life(view: View) -> Answer:
         See `lives.lives_of`.
     """
     lives = rating.lives_of(view)
-    names = {rating.JOINT: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
+    names = {lives.whole: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
+    names |= {joint: f"all of {joint}" for joint in lives.joints}
     bearing = Column("bearing", lambda row: names.get(row["place"], str(row["place"])))
     reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
-    rate = lives.rate(rating.JOINT)
+    rate = lives.rate(lives.whole)
     if rate.valid.size and rate.valid[0] > 0.0:
         words = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
         parts.append(Panels([Panel("lives", "Life of the joints", words, partial(_draw, lives=lives), (6.4, 3.5))]))
@@ -268,7 +269,7 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
 
 def _draw(ax: Axes, lives: rating.Lives) -> None:
     """Draw the share of the joints with a shorter life."""
-    rate = lives.rate(rating.JOINT)
+    rate = lives.rate(lives.whole)
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
@@ -277,7 +278,7 @@ def _draw(ax: Axes, lives: rating.Lives) -> None:
     nominal = float(lives.nominal_hours[-1])
     ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]
     drawing.log_loads(ax.xaxis, 0.8 * min(ends), 1.25 * max(ends), max(ends), "h")
-    ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
+    ax.set(xlabel=f"life {lives.bearing.symbol} of the {lives.whole} [h]", ylabel="share of joints with a shorter life")
     if math.isfinite(nominal):
         style.mark(ax, nominal, 1.0, style.INK)
     if math.isfinite(lives.required):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,16 +12,17 @@ from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
+from tolstat.common.mechanism import prefixes
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.shares import inapplicable, unusable, with_ends
-from tolstat.store import recorded
+from tolstat.store import Reader, recorded
 from tolstat.store.view import View
 
-JOINT = "joint"
-"""The joint: it lasts until the first of its bearings fails."""
+JOINT, SHAFT = "joint", "shaft"
+"""The joint, or the drive shaft: it lasts until the first of its bearings fails."""
 ANY = "any"
 """At least one of the bearings."""
 SHARES = (0.5, 0.9, 0.99)
@@ -50,9 +51,9 @@ class Lives:
         Pins, which bearings are named by.
     loads : ndarray, shape (n, pins)
         Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
-    hours : ndarray, shape (n, pins + 1)
-        Life of each bearing and of the joint, as in `places`, h; NaN without a result or without a rating.
-    nominal_loads, nominal_hours : ndarray, shape (pins,) and (pins + 1,)
+    hours : ndarray, shape (n, places)
+        Life of each bearing and of several together, as in `places`, h; NaN without a result or without a rating.
+    nominal_loads, nominal_hours : ndarray, shape (pins,) and (places,)
         The same of the nominal joint; NaN if there is none.
     short, fretting : dict of str to int
         Valid joints by operating point of which a bearing swings by less than ``bearing.critical_amplitude`` there, and
@@ -78,8 +79,18 @@ class Lives:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Pins, and `JOINT`."""
-        return (*self.pins, JOINT)
+        """Pins, of a drive shaft its joints, and the whole."""
+        return (*self.pins, *self.joints, self.whole)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints of a drive shaft by their names; none of a joint."""
+        return tuple(name.rstrip(".") for name in prefixes(self.view.mechanism)) if self.of_shaft else ()
+
+    @property
+    def whole(self) -> str:
+        """What all bearings are of: `JOINT` or `SHAFT`."""
+        return SHAFT if self.of_shaft else JOINT
 
     @property
     def of_shaft(self) -> bool:
@@ -97,7 +108,7 @@ class Lives:
         return np.nan if self.bearing.required_life is None else self.bearing.required_life / HOUR
 
     def rate(self, place: str) -> Sample:
-        """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
+        """Reciprocal of the life of one of `places`, 1/h: as with a load, higher is worse."""
         k = self.places.index(place)
         with np.errstate(divide="ignore"):
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
@@ -137,10 +148,7 @@ def lives_of(view: View) -> Lives:
     operation = [recorded.operating_points(store) for store in stores]
     speeds = np.abs([rows["speed"] for rows in operation])[:, :, None]
     swings = np.abs(
-        [
-            _misalignments(rows["alpha"], store.operation.alphas[1:], len(pins))
-            for rows, store in zip(operation, stores, strict=True)
-        ]
+        [_misalignments(rows["alpha"], store, len(pins)) for rows, store in zip(operation, stores, strict=True)]
     )  # (points, rows, pins)
     critical = bearing.critical_amplitude
     hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
@@ -154,7 +162,9 @@ def lives_of(view: View) -> Lives:
     small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
     of_pins[unrated] = np.nan
-    hours = np.column_stack([of_pins, rating_life.system_life(of_pins)])
+    whole = rating_life.system_life(of_pins)
+    of_joints = [rating_life.system_life(own) for own in np.split(of_pins, len(view.mechanism.cardan), axis=1)]
+    hours = np.column_stack([of_pins, *(of_joints if view.mechanism.is_shaft else ()), whole])
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
         {name: int(n) for name, n in zip(view.points, (some[:, skip:] & valid).sum(axis=1), strict=True) if n}
@@ -168,7 +178,7 @@ def lives_of(view: View) -> Lives:
         loads=load[skip:],
         hours=hours[skip:],
         nominal_loads=load[0] if has_nominal else np.full(len(pins), np.nan),
-        nominal_hours=hours[0] if has_nominal else np.full(len(pins) + 1, np.nan),
+        nominal_hours=hours[0] if has_nominal else np.full(hours.shape[1], np.nan),
         short=short,
         fretting=fretting,
         unrated=int((unrated[skip:].any(axis=1) & valid).sum()),
@@ -176,9 +186,12 @@ def lives_of(view: View) -> Lives:
     )
 
 
-def _misalignments(first: FloatArray, others: Sequence[float], pins: int) -> FloatArray:
-    """Misalignment of the joint that each pin is of, (rows, pins), rad: of the first joint (rows,), and of others."""
-    joints = np.column_stack([first, *(np.full(len(first), alpha) for alpha in others)])
+def _misalignments(first: FloatArray, store: Reader, pins: int) -> FloatArray:
+    """Misalignment of the joint that each pin is of, (rows, pins), rad; `first`: that of joint 1, (rows,)."""
+    joints = first[:, None]
+    if store.mechanism.is_shaft:
+        second = store.operation.alphas[1] + store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
+        joints = np.column_stack([first, second])
     return np.asarray(np.repeat(joints, pins // joints.shape[1], axis=1))
 
 

@@ -14,7 +14,7 @@ from tolstat.analysis.design import Design, Independent, Listed, Replicated
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
-from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
+from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
@@ -48,13 +48,18 @@ def operation_of(store: Reader, row: int) -> Operation:
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
     """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
-    errors = store.errors(slots, _OPERATION)
-    if not store.variants:
-        return operating(store.operation, errors)
-    first, last, _ = slots.indices(store.n)
-    rows = (operating(operation_of(store, row), errors[row - first : row - first + 1]) for row in range(first, last))
-    each = list(rows)
-    return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
+    has_spline = store.mechanism.spline
+    errors = store.errors(slots, (*_OPERATION, SPLINE) if has_spline else _OPERATION)
+    rows = np.arange(store.n)[slots]
+    number = store.design()["variant"][rows] if store.variants else np.zeros(len(rows), np.intp)
+    points = {name: np.empty(len(rows)) for name in MEANS}
+    for variant in np.unique(number):
+        here = number == variant
+        first = int(rows[here][0])
+        spline = joint_of(store, first).shaft.spline if has_spline else None
+        for name, values in operating(operation_of(store, first), errors[here], spline).items():
+            points[name][here] = values
+    return points
 
 
 def options_of(store: Reader, row: int) -> Options:

@@ -20,7 +20,7 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import Joint, Operation, OperationInSeries, Series, orders
+from tolstat.joint import SPLINE, Joint, Operation, OperationInSeries, Series, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
 from tolstat.joint.sections import RIGID
@@ -259,7 +259,8 @@ class Setting(NamedTuple):
 
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
+        varies = FORCE in varied or SPLINE in varied
+        return self.joint.shaft.slides and (varies or self.operation.axial_force != 0.0)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -293,9 +294,13 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     in_series = [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        paths += [("joint", "shaft", "spline")] * any(setting.joint.shaft.spline for setting in settings)
         remedy = "remove it" if in_series else 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
+    if SPLINE in varied and "tolerances" in varied.get(FORCE, ()):
+        found = "is given beside joint.shaft.spline, whose force scatters already"
+        yield ("tolerances", *FORCE.split(".")), found, "remove one of the two"
     for key in ("speed", "torque"):
         if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"

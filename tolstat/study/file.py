@@ -188,8 +188,6 @@ def _check_method(file: Reading, sampling: Sampling) -> None:
     if sampling.joints_per_lot > 1 and not file.scatter.lots:
         remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
         file.fault("sampling.joints_per_lot", "has no effect: no tolerance has a lot", remedy)
-    if sampling.method == "cases" and file.data.get("limits"):
-        file.fault("limits", "has no effect with 'cases'", "remove it: listed joints have no exceedance")
     if sampling.method == "subset":
         remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
         file.fault("sampling.method", "'subset' is set by tolstat rare, not in a study", remedy)

@@ -224,9 +224,9 @@ def test_the_force_of_a_spline_follows_the_torque_of_each_point_and_joint(tmp_pa
     text = HEAD.partition("[operation]")[0] + DUTY + DRAWN
     torque = '[tolerances]\noperation.torque = { plus_minus = "10 N*m", distribution = "uniform" }\n'
     s = load(tmp_path, SPLINE, ("[tolerances]\n", torque), text=text)
-    assert s.tolerances["operation.spline"].describe() == {"distribution": "uniform", "lower": -1.0, "upper": 1.0}
+    assert s.tolerances["shaft.spline"].describe() == {"distribution": "uniform", "lower": -1.0, "upper": 1.0}
     errors = sampling.draw(s)
-    own = errors["operation.spline"]
+    own = errors["shaft.spline"]
     assert own[0] == 0.0
     assert -1.0 < own.min() < -0.9 < 0.9 < own.max() < 1.0
     for point, force in zip(s.points, (-200.0, 0.0), strict=True):
@@ -238,27 +238,26 @@ def test_the_force_of_a_spline_follows_the_torque_of_each_point_and_joint(tmp_pa
 
 
 def test_the_tolerance_of_a_spline_can_be_written(tmp_path: Path) -> None:
-    narrow = '[tolerances]\noperation.spline = { plus_minus = 0.5, distribution = "uniform" }\n'
+    narrow = '[tolerances]\nshaft.spline = { plus_minus = 0.5, distribution = "uniform" }\n'
     s = load(tmp_path, SPLINE, ("[tolerances]\n", narrow))
-    assert s.tolerances["operation.spline"].describe()["upper"] == 0.5
-    assert list(s.tolerances).count("operation.spline") == 1
+    assert s.tolerances["shaft.spline"].describe()["upper"] == 0.5
+    assert list(s.tolerances).count("shaft.spline") == 1
+    fixed = load(tmp_path, SPLINE, ("[tolerances]\n", "[errors]\nshaft.spline = 1.0\n[tolerances]\n"))
+    assert "shaft.spline" not in fixed.tolerances
+    assert fixed.errors == {"shaft.spline": 1.0}
 
 
 def test_a_spline_is_refused_where_it_means_nothing(tmp_path: Path) -> None:
     rigid = ('shaft.axial = "free"\n', "")
     assert f"joint.shaft.spline: {NO_EFFECT}" in faults(tmp_path, SPLINE, rigid, NO_FORCE)
-    said = faults(tmp_path, SPLINE, ("[tolerances]\n", SCATTER))
-    assert said.count("\n") == 1
-    assert "tolerances.operation.axial_force: is given beside joint.shaft.spline, whose force scatters already" in said
-    assert "hint: remove one of the two" in said
     wrong = SPLINE[1].replace("0.1", "1.2"), SPLINE[1].replace("40 mm", "-40 mm")
     assert "shaft.spline.mu: 1.2 is above 1" in faults(tmp_path, (SPLINE[0], wrong[0]))
     assert "shaft.spline.diameter" in faults(tmp_path, (SPLINE[0], wrong[1]))
-    without = '[tolerances]\noperation.spline = { plus_minus = 1, distribution = "uniform" }\n'
+    without = '[tolerances]\nshaft.spline = { plus_minus = 1, distribution = "uniform" }\n'
     assert "only joints with joint.shaft.spline have it" in faults(tmp_path, ("[tolerances]\n", without))
 
 
 def test_a_case_says_which_force_is_stuck(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
-    path.write_text(HEAD.replace(*SPLINE) + '[errors]\noperation.spline = "-1"\n', encoding="utf-8")
-    assert study.load_case(path).errors == {"operation.spline": -1.0}
+    path.write_text(HEAD.replace(*SPLINE) + '[errors]\nshaft.spline = "-1"\n', encoding="utf-8")
+    assert study.load_case(path).errors == {"shaft.spline": -1.0}

@@ -236,7 +236,7 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         ]
     if mechanism.spline:
         text = "axial force of the sticking spline over 2 mu T/d, from -1 to 1"
-        fields.append(Field("operation.spline", "1", text))
+        fields.append(Field("shaft.spline", "1", text))
     if mechanism.friction:
         fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
     for prefix in prefixes(mechanism) if mechanism.faces else ():

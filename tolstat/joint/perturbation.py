@@ -118,7 +118,7 @@ class OperationInSeries(Operation):
 
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
-SPLINE = "operation.spline"
+SPLINE = "shaft.spline"
 """Error of a joint with `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
 
 
@@ -154,7 +154,8 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     """
     values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
     if spline is not None:
-        values["axial_force"] = values["axial_force"] + errors[SPLINE] * spline.largest(values["torque"])
+        largest = 2.0 * spline.mu * np.abs(values["torque"]) / spline.diameter
+        values["axial_force"] = values["axial_force"] + errors[SPLINE] * largest
     return values
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from tolstat.common import units
@@ -250,10 +248,6 @@ class Spline(Strict):
     diameter: Length = Field(examples=["40 mm"])
     """pitch diameter d"""
 
-    def largest(self, torque: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Largest axial force (N) that it holds at torques (N m), (n,)."""
-        return 2.0 * self.mu * np.abs(torque) / self.diameter
-
 
 class Shaft(Strict):
     """Output shaft, and what holds it along its axis; bearings of both shafts.
@@ -284,7 +278,7 @@ class Shaft(Strict):
     unbalance: Unbalance | None = None
     """Unbalance of the output shaft"""
     spline: Spline | None = None
-    """Spline that sticks with a force of the error `operation.spline`, from -1 to 1, times 2 mu T/d. In a study with
+    """Spline that sticks with a force of the error `shaft.spline`, from -1 to 1, times 2 mu T/d. In a study with
     tolerances this error is uniform unless they say otherwise"""
 
     @field_validator("lateral")

@@ -48,18 +48,17 @@ def operation_of(store: Reader, row: int) -> Operation:
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
     """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
-    has_spline = store.mechanism.spline
-    errors = store.errors(slots, (*_OPERATION, SPLINE) if has_spline else _OPERATION)
-    rows = np.arange(store.n)[slots]
-    number = store.design()["variant"][rows] if store.variants else np.zeros(len(rows), np.intp)
-    points = {name: np.empty(len(rows)) for name in MEANS}
-    for variant in np.unique(number):
-        here = number == variant
-        first = int(rows[here][0])
-        spline = joint_of(store, first).shaft.spline if has_spline else None
-        for name, values in operating(operation_of(store, first), errors[here], spline).items():
-            points[name][here] = values
-    return points
+    sticks = store.mechanism.spline
+    errors = store.errors(slots, (*_OPERATION, SPLINE) if sticks else _OPERATION)
+
+    def at(row: int, errors: NDArray[np.void]) -> dict[str, NDArray[np.float64]]:
+        return operating(operation_of(store, row), errors, joint_of(store, row).shaft.spline if sticks else None)
+
+    if not store.variants:
+        return at(0, errors)
+    first, last, _ = slots.indices(store.n)
+    each = [at(row, errors[row - first : row - first + 1]) for row in range(first, last)]
+    return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
 
 
 def options_of(store: Reader, row: int) -> Options:

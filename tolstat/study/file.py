@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error, raise_a
 from tolstat.common.loads import load_of, loads_of, split, units_of_limits
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import Joint, Series, reading
+from tolstat.joint import SPLINE, Joint, Series, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -25,7 +25,7 @@ from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.points import Point
-from tolstat.study.selection import Assignments, Reading, toleranced_units
+from tolstat.study.selection import Assignments, Entry, Reading, toleranced_units
 from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
@@ -100,6 +100,9 @@ def _scatter(file: Reading) -> Tolerances:
             with gather(file.faults):
                 file.claims.claim(entry, selected)
             written.append((entry, selected))
+    named = {*(file.errors or ()), *(name for _, selected in written for name in selected)}
+    if file.mechanism.spline and written and SPLINE not in named:
+        written.append((Entry(SPLINE, ("joint", SPLINE), {"plus_minus": 1.0, "distribution": "uniform"}), [SPLINE]))
     return kinds.read(written, file)
 
 

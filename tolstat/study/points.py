@@ -259,8 +259,8 @@ class Setting(NamedTuple):
 
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        varies = FORCE in varied or SPLINE in varied
-        return self.joint.shaft.slides and (varies or self.operation.axial_force != 0.0)
+        pulled = {FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0
+        return self.joint.shaft.slides and bool(pulled)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -298,9 +298,6 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         remedy = "remove it" if in_series else 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
-    if SPLINE in varied and "tolerances" in varied.get(FORCE, ()):
-        found = "is given beside joint.shaft.spline, whose force scatters already"
-        yield ("tolerances", *FORCE.split(".")), found, "remove one of the two"
     for key in ("speed", "torque"):
         if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"

@@ -21,7 +21,6 @@ from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
 from tolstat.common.tables import tables
 from tolstat.common.units import to_si
-from tolstat.joint import SPLINE
 from tolstat.joint.model import giving
 from tolstat.joint.reading import is_joint
 from tolstat.study import signals
@@ -39,8 +38,7 @@ def error_units(mechanism: Mechanism) -> dict[str, str]:
 @cache
 def given_units(mechanism: Mechanism) -> dict[str, str]:
     """SI unit of the errors that ``[errors]`` and a case can give."""
-    units = error_units(mechanism).items()
-    return {name: unit for name, unit in units if not name.startswith("operation.") or name == SPLINE}
+    return {name: unit for name, unit in error_units(mechanism).items() if not name.startswith("operation.")}
 
 
 @cache
@@ -388,7 +386,7 @@ def fixed_errors(
     fixed: dict[str, float] = {}
     units = given_units(file.mechanism)
     for entry in entries(table, file.mechanism, *section):
-        if entry.pattern.startswith("operation.") and entry.pattern not in units:
+        if entry.pattern.startswith("operation."):
             file.fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
             continue
         with gather(file.faults):

@@ -18,7 +18,6 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict
 from tolstat.display.text import percent
-from tolstat.joint import SPLINE
 from tolstat.study import selection
 from tolstat.study.axes import alike
 from tolstat.study.selection import Entry, Reading
@@ -217,8 +216,6 @@ def any_pair(share: float, pairs: int) -> float:
 def entries(table: Mapping[str, Any], fit: Fit | None, mechanism: Mechanism) -> Iterator[Entry]:
     """Entries of ``[tolerances]``, with those of the holes' and of the pins' diameters in place of the fit.
 
-    The force of a spline that no entry selects is uniform between its ends.
-
     Parameters
     ----------
     table : mapping
@@ -228,19 +225,14 @@ def entries(table: Mapping[str, Any], fit: Fit | None, mechanism: Mechanism) -> 
     mechanism : Mechanism
         Whose errors they are of.
     """
-    sticks = mechanism.spline and bool(table)
     for key, value in table.items():
         if key != KEY:
             if key in selection.joints(mechanism) and isinstance(value, Mapping):
                 value = {name: of_joint for name, of_joint in value.items() if name != KEY}
-            for entry in selection.entries({key: value}, mechanism, "tolerances"):
-                sticks = sticks and not selection.select(entry.pattern, [SPLINE])
-                yield entry
+            yield from selection.entries({key: value}, mechanism, "tolerances")
         elif fit is not None:
             for pattern, zone in zip(patterns(mechanism), fit.entry.zones, strict=True):
                 yield Entry(pattern, PATH, fit.entry.scatter(zone))
-    if sticks:
-        yield Entry(SPLINE, ("tolerances", SPLINE), {"plus_minus": 1.0, "distribution": "uniform"})
 
 
 def larger(pin: Distribution, hole: Distribution, clearance: float) -> float:

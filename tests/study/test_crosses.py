@@ -48,18 +48,24 @@ def test_of_one_joint_the_errors_of_its_parts_are_counted(tmp_path: Path) -> Non
 
 REFUSED = {
     "names that are no errors": (
-        "pin1.tilt_x,pin1.position,hole9.tilt_t,pin1.tilt_z\n1,2,3,4\n",
-        r"cross.csv:1: has 'pin1.tilt_x', 'pin1.position', which are no errors\n.*did you mean .*; or remove",
+        "pin1.tilt_x,pin1.position,hole9.tilt_t,PIN2.tilt_t,pin1.tilt_z [deg],p.no\n1,2,3,4,5,6\n",
+        r"cross.csv:1: has columns that are no errors: 'pin1.tilt_x', 'pin1.position', 'hole9.tilt_t', 'PIN2.tilt_t'\n"
+        r".*remove or rename them: did you mean 'tilt_z'\?",
     ),
     "a zone": (
-        "pin1.position,pin1.tilt_z\n1,2\n",
-        r"has 'pin1.position', which is no error\n.*give pin1.offset_t, .*, pin1.tilt_z; or remove",
+        "pin1.position,pin1.tilt_z [deg]\n1,2\n",
+        r"no errors: 'pin1.position'\n.*give pin1.offset_t, pin1.offset_z, pin1.tilt_t, pin1.tilt_z$",
     ),
+    "clearance beside diameter": (
+        "pin1.diameter [um],pin1.clearance [um]\n1,2\n",
+        r"cross.csv:1: pin1.clearance: is given beside pin1.diameter\n.*remove one of the two columns",
+    ),
+    "no unit": ("pin1.tilt_z\n0.1\n", r"cross.csv:1: pin1.tilt_z: has no unit\n.*header: pin1.tilt_z \[deg\]"),
     "nothing measured": (
         "part,torque\n1,2\n",
         r"has no column of an error\n.*write names such as pin1.tilt_z; there are part, torque",
     ),
-    "several joints": ("pin1.tilt_z\n0.1\n0.2\n", r"cross.csv:3: has more than 1 row below the header"),
+    "several joints": ("pin1.tilt_z [deg]\n0.1\n0.2\n", r"cross.csv:3: is a second joint\n.*tolstat evaluate STUDY"),
 }
 
 
@@ -67,7 +73,7 @@ REFUSED = {
 def test_faults_of_a_table(tmp_path: Path, name: str) -> None:
     text, words = REFUSED[name]
     with pytest.raises(InputError, match=words) as caught:
-        crosses.read(table(tmp_path, text), CARDAN, UNITS, VARIED, most=1)
+        crosses.read(table(tmp_path, text), CARDAN, UNITS, VARIED, single=True)
     assert len(caught.value.faults) == 1
 
 

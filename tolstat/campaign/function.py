@@ -20,7 +20,7 @@ from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, input_error, raise_all
 from tolstat.common.loads import shown_loads, units_of_loads
-from tolstat.common.tables import VALID, Options, tables
+from tolstat.common.tables import Options, tables
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
@@ -70,8 +70,8 @@ class Function:
     status : ndarray, (n,), uint8
         `Status` of the joints of the last call.
     turning : dict of str to ndarray
-        Of the joints of the last call ``equivalent_load`` of each bearing, (n, pins), N, NaN without a valid load;
-        ``alpha`` of each Cardan joint, (n, joints), rad, and ``omega``, (n,), rad/s: what lives follow from.
+        Of the joints of the last call ``equivalent_load`` of each bearing, (n, pins), N; ``alpha`` of each Cardan
+        joint, (n, joints), rad; ``omega``, (n,), rad/s: what lives follow from.
     simulated : int
         Number of joints simulated so far.
     """
@@ -272,7 +272,6 @@ class Function:
                 self.status[block.slots] = table["status"]
                 for name, values in self.turning.items():
                     values[block.slots] = (table if name == "equivalent_load" else block.params)[name]
-                self.turning["equivalent_load"][block.slots[~np.isin(table["status"], VALID)]] = np.nan
                 loads[block.slots] = loads_of(table, self.loads, study.mechanism)
         return loads
 

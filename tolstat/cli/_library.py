@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from tolstat.campaign import work as works
     from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
-    from tolstat.common import text_table as text_tables
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
     from tolstat.joint import sections
@@ -40,8 +39,8 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("columns", "loads", "strict", "tables", "text_table", "units")
-    columns, load_units, strict, tables, text_tables, units = (Late(f"tolstat.common.{name}") for name in names)
+    names = ("columns", "loads", "strict", "tables", "units")
+    columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("accuracy", "joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
     accuracy, joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)

@@ -52,16 +52,11 @@ def simulate(
     say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
-    _deliver(result, _lives(loaded, result), out, as_json)
-
-
-def _lives(case: library.studies.Study, result: library.replays.CaseResult) -> dict[str, float]:
-    """Rating lives of a joint, h, to four digits."""
-    table, params = result.simulation.results, result.params
-    valid = np.isin(table["status"], library.tables.VALID)[:, None]
-    turning = {"equivalent_load": np.where(valid, table["equivalent_load"], np.nan)}
-    lives = library.parts.lives(case.joint.bearing, turning | {name: params[name] for name in ("alpha", "omega")})
-    return {f"{life.name} [h]": float(f"{life.values[0]:.4g}") for life in lives}
+    joints = library.parts.of_case(loaded, result)
+    _deliver(result, joints.values() if as_json and joints.parts else {}, out, as_json)
+    if joints.parts and not as_json:
+        typer.echo()
+        deliver(joints, wide=False)
 
 
 def replay(
@@ -202,13 +197,9 @@ def evaluate(
         if hint:
             say(f"  hint: {hint}")
     if out != "-":
-        found = [
-            library.parts.Quantity(name, unit_of[name], f.limits.get(name, np.nan), values)
-            for name, values in zip(f.loads, y.T, strict=True)
-        ]
-        found += library.parts.lives(whole.joint.bearing, f.turning)
-        labels = [f"line {line}" for line in joints.lines]
-        deliver(library.answers.Answer("evaluate", "Joints", list(library.parts.parts(found, labels))), wide=False)
+        values, labels = dict(zip(f.loads, y.T, strict=True)), [f"line {line}" for line in joints.lines]
+        found = library.parts.parts(f.study, values, f.turning, labels, f.status)
+        deliver(library.answers.Answer("evaluate", "Joints", found), wide=False)
 
 
 def show(

@@ -2,61 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import FloatArray, loads_of
+from tolstat.campaign.replay import CaseResult
+from tolstat.common.loads import FloatArray, loads_of, units_of_loads
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Column, Part, Row, Sentence, Table
+from tolstat.display.answer import Answer, Column, Part, Row, Sentence, Table
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.questions.bearing_life.lives import HOUR, bearing_of, rated, turning_of
+from tolstat.questions.bearing_life.lives import HOUR, rated, turning_of
 from tolstat.store.view import View
+from tolstat.study import Study
 
 OF_SHAFTS = ("axial", "lateral", "moment", "bearing_a", "bearing_b")
 """Kinds of loads of shafts that are shown, with limits or without."""
-SIDE_BY_SIDE = 4
-"""Maximum number of joints that are shown beside each other; of more the worst one is shown."""
+MOST = 3
+"""Maximum number of joints that are shown, side by side."""
 
 
-@dataclass(frozen=True, eq=False)
-class Quantity:
+class Quantity(NamedTuple):
     """A load or a life of n joints.
 
     Attributes
     ----------
     name, unit : str
-        Its name and unit.
+        Its name and unit; hours of a life.
     limit : float
         What loads must not exceed, and lives must reach; NaN where none is given.
     values : ndarray, shape (n,)
-        NaN without a valid result.
-    is_life : bool
-        Whether less is worse.
+        NaN without a result or a rating.
     """
 
     name: str
     unit: str
     limit: float
     values: FloatArray
-    is_life: bool = False
 
     @property
-    def beyond(self) -> NDArray[np.bool_]:
-        """Joints that exceed the limit, or do not reach it, bool (n,)."""
-        return self.values < self.limit if self.is_life else self.values > self.limit
-
-    @property
-    def worst(self) -> int:
-        """Joint with the largest load or the shortest life; -1 where none has any."""
-        if np.isnan(self.values).all():
-            return -1
-        return int(np.nanargmin(self.values) if self.is_life else np.nanargmax(self.values))
+    def use(self) -> FloatArray:
+        """Load over limit, or required life over life, (n,): above 1 the joint is beyond the limit."""
+        with np.errstate(divide="ignore"):
+            return self.limit / self.values if self.unit == "h" else self.values / self.limit
 
 
 def names_of(limits: Mapping[str, float], mechanism: Mechanism) -> list[str]:
@@ -65,139 +58,93 @@ def names_of(limits: Mapping[str, float], mechanism: Mechanism) -> list[str]:
     return list(dict.fromkeys([*limits, *of_shafts]))
 
 
-def lives(bearing: Bearing | None, turning: Mapping[str, FloatArray]) -> list[Quantity]:
-    """Rating lives of the pins' bearings and of the joint; none without what they need.
-
-    Parameters
-    ----------
-    bearing : Bearing or None
-        Bearing of each pin.
-    turning : mapping
-        See `lives.turning_of`.
-    """
-    if bearing is None or bearing.lacking(FOR_LIFE):
-        return []
-    _, hours, _ = rated(bearing, np.ones(1), [turning])
-    required = np.nan if bearing.required_life is None else bearing.required_life / HOUR
-    pins = hours.shape[1] - 1
-    names = [*(f"life of pin{number + 1}" for number in range(pins)), f"life of all {text.in_words(pins)}"]
-    limits = [*[np.nan] * pins, required]
-    return [
-        Quantity(name, "h", limit, values, True) for name, limit, values in zip(names, limits, hours.T, strict=True)
-    ]
+def of_case(case: Study, result: CaseResult) -> Answer:
+    """Answer on the joint of a case beside the same joint without errors, see `parts`."""
+    both, every = np.concatenate([result.simulation.results, result.nominal]), loads_of(case.mechanism)
+    loads = {name: every[name].of(both) for name in names_of(case.limits, case.mechanism)}
+    turning = {name: np.repeat(result.params[name], 2, axis=0) for name in ("alpha", "omega")}
+    turning["equivalent_load"] = both["equivalent_load"]
+    return Answer("simulate", "Joint", parts(case, loads, turning, ["this joint", "without errors"], both["status"]))
 
 
 def of_listed(view: View) -> list[Part]:
-    """Parts of an answer on the joints that a study lists: where it has limits, or a joint has a rating life.
-
-    Parameters
-    ----------
-    view : View
-        A file of a study whose method is ``cases``.
-    """
-    store, design = view.store, view.store.design()
-    valid = np.isin(view.status, VALID)
-    bearing = bearing_of(view)
-    kept = {column.field for column in view.columns}
-    has_life = bearing is not None and not bearing.lacking(FOR_LIFE) and "equivalent_load" in kept
-    if not (view.limits or has_life):
-        return []
-    names = [name for name in names_of(view.limits, view.mechanism) if name in view.kept_loads]
-    loads = {name: view.load(name) for name in names}
-    found = [
-        Quantity(name, load.unit, load.limit or np.nan, np.where(valid, load.values, np.nan))
-        for name, load in loads.items()
-    ]
-    if has_life:
-        turning = turning_of(store)
-        turning["equivalent_load"] = np.where(valid[:, None], turning["equivalent_load"], np.nan)
-        found += lives(bearing, turning)
-    labels = [store.case_names[number] for number in design["case"]]
+    """Parts of an answer on the joints that a study lists, see `parts`."""
+    loads = {name: view.load(name).values for name in names_of(view.limits, view.mechanism) if name in view.kept_loads}
+    design = view.store.design()
+    labels = [view.store.case_names[number] for number in design["case"]]
     if len(set(design["group"])) > 1:
         labels = [f"{label} ({number})" for number, label in enumerate(labels)]
-    return list(parts(found, labels))
+    return parts(view.study, loads, turning_of(view.store), labels, view.status)
 
 
-def parts(found: Sequence[Quantity], labels: Sequence[str]) -> Iterator[Part]:
-    """Sentence on the limits, and a table of all loads and lives.
+def parts(
+    study: Study,
+    loads: Mapping[str, FloatArray],
+    turning: Mapping[str, FloatArray],
+    labels: Sequence[str],
+    status: NDArray[np.uint8],
+) -> list[Part]:
+    """Sentence on the limits, and a table of loads and lives; none without limits and rating lives.
 
     Parameters
     ----------
-    found : sequence of Quantity
-        Loads and lives of n joints.
+    study : Study
+        Limits, and bearings.
+    loads : mapping
+        Loads of n joints, SI, (n,) each.
+    turning : mapping
+        What the lives follow from, see `lives.turning_of`.
     labels : sequence of str
-        Name of each joint, (n,).
+        Name of each joint, (n,). Of more than `MOST` joints the table shows those nearest to a limit.
+    status : ndarray, (n,)
+        `Status` of each joint.
     """
-    limited = [quantity for quantity in found if not np.isnan(quantity.limit)]
-    if limited:
-        yield Sentence(_verdict(limited, labels), "lead")
-    rows = [
-        {
-            "joint": label,
-            "quantity": quantity.name,
-            "unit": quantity.unit,
-            "limit": quantity.limit,
-            "value": float(value),
-            "beyond": bool(beyond),
-        }
-        for quantity in found
-        for label, value, beyond in zip(labels, quantity.values, quantity.beyond, strict=True)
-    ]
+    of_bearings, units = lives(study.joint.bearing, turning), units_of_loads(study.mechanism)
+    if not (study.limits or of_bearings):
+        return []
+    of_loads = [Quantity(name, units[name], study.limits.get(name, np.nan), of) for name, of in loads.items()]
+    valid, shown = np.isin(status, VALID), list(range(len(labels)))
+    found = [each._replace(values=np.where(valid, each.values, np.nan)) for each in [*of_loads, *of_bearings]]
+    verdict: list[Part] = []
+    if limited := [each for each in found if not np.isnan(each.limit)]:
+        use = np.nan_to_num(np.array([each.use for each in limited]), nan=-1.0)
+        shown = np.argsort(-use.max(axis=0), kind="stable").tolist() if len(labels) > MOST else shown
+        verdict.append(Sentence(_verdict(limited, use, [(labels[k], k) for k in shown]), "lead"))
     columns = [
         Column("load or life", lambda row: str(row["quantity"].name)),
-        Column("limit", lambda row: _text(row["quantity"].limit, row["quantity"].unit)),
-        *(_beside(labels) if len(labels) <= SIDE_BY_SIDE else _worst(labels)),
+        Column("limit", lambda row: text.value(row["quantity"].limit, row["quantity"].unit)),
+        *(Column(labels[k], partial(_cell, k)) for k in shown[:MOST]),
     ]
-    seen = [{"quantity": quantity} for quantity in found]
-    yield Table("joints", "Loads and lives of the joints", columns, rows, seen=seen)
-
-
-def _text(value: float, unit: str) -> str:
-    return "no limit" if np.isinf(value) else text.value(value, unit)
-
-
-def _cell(number: int) -> Callable[[Row], str]:
-    def cell(row: Row) -> str:
-        of: Quantity = row["quantity"]
-        if number < 0:
-            return "-"
-        mark = (" short" if of.is_life else " above") if of.beyond[number] else ""
-        return f"{_text(float(of.values[number]), of.unit)}{mark}"
-
-    return cell
-
-
-def _beside(labels: Sequence[str]) -> list[Column]:
-    """A column for each joint."""
-    return [Column(label, _cell(number)) for number, label in enumerate(labels)]
-
-
-def _worst(labels: Sequence[str]) -> list[Column]:
-    """Columns of the worst joint, and of how many are beyond the limit."""
-
-    def beyond(row: Row) -> str:
-        of: Quantity = row["quantity"]
-        return "" if np.isnan(of.limit) else f"{int(of.beyond.sum())} of {int((~np.isnan(of.values)).sum())}"
-
-    def joint(row: Row) -> str:
-        return labels[row["quantity"].worst] if row["quantity"].worst >= 0 else "-"
-
-    return [
-        Column("worst", lambda row: _cell(row["quantity"].worst)(row)),
-        Column("joint", joint, words=True),
-        Column("beyond the limit", beyond),
+    rows = [
+        {"joint": label, "quantity": each.name, "unit": each.unit, "limit": each.limit, "value": value}
+        for each in found
+        for label, value in zip(labels, each.values.tolist(), strict=True)
     ]
+    seen = [{"quantity": each} for each in found]
+    return [*verdict, Table("joints", "Loads and lives of the joints", columns, rows, seen=seen)]
 
 
-def _verdict(limited: Sequence[Quantity], labels: Sequence[str]) -> str:
+def lives(bearing: Bearing | None, turning: Mapping[str, FloatArray]) -> list[Quantity]:
+    """Rating lives of the pins' bearings and of the joint; none without what they need."""
+    if bearing is None or bearing.lacking(FOR_LIFE):
+        return []
+    hours = rated(bearing, np.ones(1), [turning])[1].T
+    required = np.nan if bearing.required_life is None else bearing.required_life / HOUR
+    of_pins = [Quantity(f"life of pin{i}", "h", np.nan, of_pin) for i, of_pin in enumerate(hours[:-1], 1)]
+    return [*of_pins, Quantity(f"life of all {text.in_words(len(of_pins))}", "h", required, hours[-1])]
+
+
+def _cell(number: int, row: Row) -> str:
+    of: Quantity = row["quantity"]
+    beyond = (" short" if of.unit == "h" else " above") if of.use[number] > 1.0 else ""
+    return f"{text.value(float(of.values[number]), of.unit)}{beyond}"
+
+
+def _verdict(limited: Sequence[Quantity], use: FloatArray, joints: Sequence[tuple[str, int]]) -> str:
     """Joints beyond limits: ``Beyond a limit: 2 of 5 joints: line 2 (cross1.F, psi), line 5 (psi).``."""
-    beyond = np.array([quantity.beyond for quantity in limited])
-    out = np.flatnonzero(beyond.any(axis=0))
-    named = [
-        ", ".join(quantity.name for quantity, is_out in zip(limited, beyond[:, k], strict=True) if is_out) for k in out
-    ]
-    each = [f"{labels[k]} ({names})" for k, names in zip(out[:SIDE_BY_SIDE], named, strict=False)]
-    listed = f": {', '.join(each)}{' and others' * (len(out) > SIDE_BY_SIDE)}" if each else ""
-    lacking = int(np.isnan([quantity.values for quantity in limited]).any(axis=0).sum())
-    without = f"; {lacking} without a valid result" if lacking else ""
-    return f"Beyond a limit: {len(out) or 'none'} of {len(labels)} joints{listed}{without}."
+    names = [[each.name for each, ratio in zip(limited, use[:, k], strict=True) if ratio > 1.0] for _, k in joints]
+    beyond = [f"{label} ({', '.join(own)})" for (label, _), own in zip(joints, names, strict=True) if own]
+    listed = f": {', '.join(beyond[:MOST])}{' and others' * (len(beyond) > MOST)}" if beyond else ""
+    lacking = int((use < 0.0).any(axis=0).sum())
+    without = f"; {lacking} without a valid load or a rating" if lacking else ""
+    return f"Beyond a limit: {len(beyond) or 'none'} of {len(joints)} joints{listed}{without}."

@@ -38,51 +38,56 @@ def read(
     units: Mapping[str, str],
     varied: Collection[str],
     needed: Collection[str] = (),
-    most: int | None = None,
+    single: bool = False,
 ) -> Crosses:
     """Read a table of measured joints.
 
     Parameters
     ----------
     path : Path
-        Text table; its header has names of errors. Columns without a unit are in SI units.
+        Text table; its header has names of errors. Columns without a unit are in SI units unless it is of a `single`
+        joint, which needs units.
     mechanism : Mechanism
         What the joints are.
     units : mapping of str to str
         SI unit of each column that is read if there is one of this name.
     varied : collection of str
-        Errors that are named as not measured where they have no column.
+        Errors that are counted as not measured where they have no column.
     needed : collection of str
         Columns that must be there.
-    most : int, optional
-        Maximum number of joints.
+    single : bool
+        Whether it has one row.
 
     Raises
     ------
     InputError
-        With every fault of the file: no column of an error, columns that look like errors and are none, cells.
+        With every fault of the file: columns that look like errors and are none, or contradict each other; no column of
+        an error; cells.
     """
     table = TextTable(path)
-    columns = table.numbers(units, list(needed), 1, units)
+    columns = table.numbers(units, list(needed), 1, None if single else units)
     others = [name for name in table.columns if name not in columns]
     results = [name for name in others if name in {column.name for column in result_columns(mechanism)}]
-    zones, known = zone_units(mechanism), {*results, *error_units(mechanism)}
-    features = {halves(name)[0] for name in zones}
-    if wrong := [name for name in others if halves(name)[0] in features and halves(name)[1] and name not in known]:
-        first = wrong[0]
-        instead = f"give {', '.join(columns_of(first))}" if first in zones else suggestion(first, list(units))
-        found = f"has {', '.join(map(repr, wrong))}, which {'is no error' if len(wrong) == 1 else 'are no errors'}"
-        table.fault(table.head, "", found, f"{instead}; or remove the column{'s' * (len(wrong) > 1)}")
-    if not needed and not wrong and not columns:
-        example, there = next(iter(varied), next(iter(units))), ", ".join(table.columns) or "none"
-        table.fault(table.head, "", "has no column of an error", f"write names such as {example}; there are {there}")
-    if most is not None and len(table.rows) > most:
-        table.fault(table.rows[most][0], "", f"has more than {most} row below the header", "give one row a file")
+    zones = zone_units(mechanism)
+    parts, ends = ({halves(name)[k] for name in (*zones, *given_units(mechanism))} for k in (0, 1))
+    strange = [name for name in others if "." in name and name not in (*results, *error_units(mechanism))]
+    halved = {name: halves(name.casefold()) for name in strange}
+    if wrong := [name for name, (part, end) in halved.items() if part in parts or end in ends]:
+        instead = f"give {', '.join(columns_of(wrong[0]))}" if wrong[0] in zones else suggestion(wrong[0], list(units))
+        names = ", ".join(map(repr, wrong))
+        table.fault(table.head, "", f"has columns that are no errors: {names}", f"remove or rename them: {instead}")
+    elif not columns and not needed:
+        remedy = f"write names such as {next(iter(varied), next(iter(units)))}; there are {', '.join(others) or 'none'}"
+        table.fault(table.head, "", "has no column of an error", remedy)
+    instead_of = {name: column for column in columns for name in excludes(mechanism).get(column, ())}
+    for name in (name for name in columns if name.endswith(".clearance") and name in instead_of):
+        table.fault(table.head, name, f"is given beside {instead_of[name]}", "remove one of the two columns")
+    if single and len(table.rows) > 1:
+        table.fault(table.rows[1][0], "", "is a second joint", "give one row a file, or all to: tolstat evaluate STUDY")
     table.check()
     left_out = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
     notes = [f"columns left out: {', '.join(left_out)}"] if left_out else []
-    instead_of = {name for column in columns for name in excludes(mechanism).get(column, ())}
-    if lacking := len(set(varied) - columns.keys() - instead_of):
+    if lacking := len(set(varied) - columns.keys() - instead_of.keys()):
         notes.append(f"{lacking} error{'s' * (lacking > 1)} not measured: taken as nominal")
     return Crosses(columns, [line for line, _ in table.rows], [f"{path}: {note}" for note in notes])
 
@@ -91,5 +96,5 @@ def of_one(path: Path, mechanism: Mechanism) -> tuple[dict[str, float], list[str
     """Errors of the only joint of a table, SI, and what there is to be said; see `read`."""
     units = given_units(mechanism)
     of_parts = [name for name in units if halves(name)[0] in features(mechanism) and not name.endswith(".clearance")]
-    columns, _, notes = read(path, mechanism, units, of_parts, most=1)
+    columns, _, notes = read(path, mechanism, units, of_parts, single=True)
     return {name: float(values[0]) for name, values in columns.items()}, notes

@@ -30,12 +30,12 @@ from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "series", "solver", "errors")
+OF_CASE = ("joint", "operation", "series", "solver", "errors", "limits")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
     *("tolerances", "correlation", "sampling", "sweep", "grid", "case", "variant", "assumed"),
-    *("limits", "fatigue", "output"),
+    *("fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
@@ -305,18 +305,22 @@ def load_case(path: str | Path) -> Study:
     """
     file = Reading(Path(path), OF_CASE)
     if "sampling" in file.data:
-        raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
+        remedy = (
+            f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"
+        )
+        raise input_error(file.place, "is a study, not a case of one joint", remedy)
     _read(file, ["joint", "series"])
+    file.parts["points"] = ()
     with gather(file.faults):
-        file.parts["operation"] = points.operation(file)
-    _read(file, ["solver", "errors"])
+        file.parts["points"] = (Point("", points.operation(file), 1.0),)
+    _read(file, ["operation", "solver", "errors", "limits"])
     if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'
         file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
     if None in (file.joint, file.operation, file.solver, file.errors):
         file.finish()
     one, parts = Sampling(method="cases"), (file.joint, file.operation, file.solver, file.errors)
-    case = Study(file.path, file.text, *parts, one, Output(), (Point("", file.operation, 1.0),))
+    case = Study(file.path, file.text, *parts, one, Output(), file.points, limits=file.limits)
     with gather(file.faults):
         case.check_mounting()
     file.finish()

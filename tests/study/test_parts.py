@@ -171,6 +171,6 @@ def test_a_grade_is_distance_times_speed() -> None:
 def test_a_spline_that_sticks_pulls_like_an_axial_force() -> None:
     """2 mu T/d at 100 N m, mu 0.1, d 40 mm: 500 N."""
     spline = {"spline": {"mu": 0.1, "diameter": "40 mm"}}
-    rows, mechanism = held({"operation.spline": -0.5}, shaft=FREE | spline, axial_force=30.0)
+    rows, mechanism = held({"shaft.spline": -0.5}, shaft=FREE | spline, axial_force=30.0)
     assert mechanism.spline
     assert rows["F_a"][0] == pytest.approx(30.0 - 250.0)

@@ -30,7 +30,8 @@ def simulate(
 
     Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
     the joint without errors: forces of the bushings, bending moments at the roots of pins and arms, contact forces of
-    the pins, and psi; the rating lives of the bearings where the joint has what they need.
+    the pins, and psi. If CASE has limits, or the joint what rating lives need, prints which limits are exceeded, and
+    the lives of the bearings.
 
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
 
@@ -149,8 +150,8 @@ def evaluate(
     without a column are those of [errors] of STUDY, or nominal, as is said. Zones of STUDY do not matter: joints have
     offsets and tilts. If STUDY has several joints, a column variant says which. Other columns are left out and named.
     The output has a row for each joint in the same order: its status, then its loads, with the names in the first line
-    and the units in the second. A load is empty where a joint has none. Prints which joints are beyond a limit, loads
-    with limits, loads of the shafts, and rating lives of the bearings where the joint has what they need.
+    and the units in the second. A load is empty where a joint has none. If STUDY has limits, or the joint what rating
+    lives need, prints which joints are beyond a limit, loads with limits, those of the shafts, and lives.
 
     Example: tolstat evaluate studies/iso2768_f.toml --in joints.csv --out y.csv
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import NamedTuple
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.replay import CaseResult
+from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray, loads_of, units_of_loads
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Column, Part, Row, Sentence, Table
-from tolstat.joint import Bearing
+from tolstat.display.answer import Answer, Column, Part, Sentence, Table
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import HOUR, rated, turning_of
 from tolstat.store.view import View
@@ -25,31 +24,6 @@ OF_SHAFTS = ("axial", "lateral", "moment", "bearing_a", "bearing_b")
 """Kinds of loads of shafts that are shown, with limits or without."""
 MOST = 3
 """Maximum number of joints that are shown, side by side."""
-
-
-class Quantity(NamedTuple):
-    """A load or a life of n joints.
-
-    Attributes
-    ----------
-    name, unit : str
-        Its name and unit; hours of a life.
-    limit : float
-        What loads must not exceed, and lives must reach; NaN where none is given.
-    values : ndarray, shape (n,)
-        NaN without a result or a rating.
-    """
-
-    name: str
-    unit: str
-    limit: float
-    values: FloatArray
-
-    @property
-    def use(self) -> FloatArray:
-        """Load over limit, or required life over life, (n,): above 1 the joint is beyond the limit."""
-        with np.errstate(divide="ignore"):
-            return self.limit / self.values if self.unit == "h" else self.values / self.limit
 
 
 def names_of(limits: Mapping[str, float], mechanism: Mechanism) -> list[str]:
@@ -99,52 +73,46 @@ def parts(
     status : ndarray, (n,)
         `Status` of each joint.
     """
-    of_bearings, units = lives(study.joint.bearing, turning), units_of_loads(study.mechanism)
-    if not (study.limits or of_bearings):
+    hours, bearing = lives(study, turning), study.joint.bearing
+    if not (study.limits or hours):
         return []
-    of_loads = [Quantity(name, units[name], study.limits.get(name, np.nan), of) for name, of in loads.items()]
-    valid, shown = np.isin(status, VALID), list(range(len(labels)))
-    found = [each._replace(values=np.where(valid, each.values, np.nan)) for each in [*of_loads, *of_bearings]]
-    verdict: list[Part] = []
-    if limited := [each for each in found if not np.isnan(each.limit)]:
-        use = np.nan_to_num(np.array([each.use for each in limited]), nan=-1.0)
-        shown = np.argsort(-use.max(axis=0), kind="stable").tolist() if len(labels) > MOST else shown
-        verdict.append(Sentence(_verdict(limited, use, [(labels[k], k) for k in shown]), "lead"))
-    columns = [
-        Column("load or life", lambda row: str(row["quantity"].name)),
-        Column("limit", lambda row: text.value(row["quantity"].limit, row["quantity"].unit)),
-        *(Column(labels[k], partial(_cell, k)) for k in shown[:MOST]),
-    ]
-    rows = [
-        {"joint": label, "quantity": each.name, "unit": each.unit, "limit": each.limit, "value": value}
-        for each in found
-        for label, value in zip(labels, each.values.tolist(), strict=True)
-    ]
-    seen = [{"quantity": each} for each in found]
-    return [*verdict, Table("joints", "Loads and lives of the joints", columns, rows, seen=seen)]
+    required = bearing.required_life if hours and bearing else None
+    limits = study.limits | ({} if required is None else {list(hours)[-1]: required / HOUR})
+    units, values = units_of_loads(study.mechanism) | dict.fromkeys(hours, "h"), {**loads, **hours}
+    table = np.where(np.isin(status, VALID), np.array(list(values.values())), np.nan)
+    limit = np.array([[limits.get(name, np.nan)] for name in values])
+    with np.errstate(divide="ignore"):
+        use = np.where([[name in hours] for name in values], limit / table, table / limit)
+    nearest = np.argsort(-np.nan_to_num(use, nan=-1.0).max(axis=0), kind="stable").tolist()
+    shown = (nearest if limits and len(labels) > MOST else range(len(labels)))[:MOST]
+    rows, seen = [], []
+    for name, own, of, ratios in zip(values, limit[:, 0], table, use, strict=True):
+        same = {"quantity": name, "unit": units[name], "limit": float(own)}
+        rows += [{"joint": label} | same | {"value": float(of[k])} for k, label in enumerate(labels)]
+        beyond = " short" if name in hours else " above"
+        cells = {labels[k]: f"{text.value(of[k], units[name])}{beyond * bool(ratios[k] > 1.0)}" for k in shown}
+        seen.append({"load or life": name, "limit": text.value(own, units[name])} | cells)
+    columns = [Column(head, itemgetter(head)) for head in seen[0]]
+    found = Table("joints", "Loads and lives of the joints", columns, rows, seen=seen)
+    if not limits:
+        return [found]
+    names = {labels[k]: [name for name, ratio in zip(values, use[:, k], strict=True) if ratio > 1.0] for k in nearest}
+    lacking = int(np.isnan(use[~np.isnan(limit[:, 0])]).any(axis=0).sum())
+    return [Sentence(_verdict(names, lacking), "lead"), found]
 
 
-def lives(bearing: Bearing | None, turning: Mapping[str, FloatArray]) -> list[Quantity]:
-    """Rating lives of the pins' bearings and of the joint; none without what they need."""
+def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Rating life of each pin's bearing and of the joint, h, (n,) each; none without what they need."""
+    bearing, pins = study.joint.bearing, kinds(study.mechanism)["contact"].places
     if bearing is None or bearing.lacking(FOR_LIFE):
-        return []
-    hours = rated(bearing, np.ones(1), [turning])[1].T
-    required = np.nan if bearing.required_life is None else bearing.required_life / HOUR
-    of_pins = [Quantity(f"life of pin{i}", "h", np.nan, of_pin) for i, of_pin in enumerate(hours[:-1], 1)]
-    return [*of_pins, Quantity(f"life of all {text.in_words(len(of_pins))}", "h", required, hours[-1])]
+        return {}
+    names = [*(f"life of {pin}" for pin in pins), f"life of all {text.in_words(len(pins))}"]
+    return dict(zip(names, rated(bearing, np.ones(1), [turning])[1].T, strict=True))
 
 
-def _cell(number: int, row: Row) -> str:
-    of: Quantity = row["quantity"]
-    beyond = (" short" if of.unit == "h" else " above") if of.use[number] > 1.0 else ""
-    return f"{text.value(float(of.values[number]), of.unit)}{beyond}"
-
-
-def _verdict(limited: Sequence[Quantity], use: FloatArray, joints: Sequence[tuple[str, int]]) -> str:
+def _verdict(names: Mapping[str, Sequence[str]], lacking: int) -> str:
     """Joints beyond limits: ``Beyond a limit: 2 of 5 joints: line 2 (cross1.F, psi), line 5 (psi).``."""
-    names = [[each.name for each, ratio in zip(limited, use[:, k], strict=True) if ratio > 1.0] for _, k in joints]
-    beyond = [f"{label} ({', '.join(own)})" for (label, _), own in zip(joints, names, strict=True) if own]
+    beyond = [f"{label} ({', '.join(own)})" for label, own in names.items() if own]
     listed = f": {', '.join(beyond[:MOST])}{' and others' * (len(beyond) > MOST)}" if beyond else ""
-    lacking = int((use < 0.0).any(axis=0).sum())
     without = f"; {lacking} without a valid load or a rating" if lacking else ""
-    return f"Beyond a limit: {len(beyond) or 'none'} of {len(joints)} joints{listed}{without}."
+    return f"Beyond a limit: {len(beyond) or 'none'} of {len(names)} joints{listed}{without}."

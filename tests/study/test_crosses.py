@@ -41,8 +41,9 @@ def test_of_one_joint_the_errors_of_its_parts_are_counted(tmp_path: Path) -> Non
     """Four pins and four holes have five positions and angles and a diameter each; a clearance stands for diameters."""
     _, notes = crosses.of_one(table(tmp_path, CROSS), CARDAN)
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
-    errors, notes = crosses.of_one(table(tmp_path, "pin1.clearance [um]\n5\n"), CARDAN)
+    errors, notes = crosses.of_one(table(tmp_path, "part,pin1.clearance [um]\nA7,5\n"), CARDAN)
     assert errors == {"pin1.clearance": pytest.approx(5e-6)}
+    assert notes[0].endswith("columns left out: part")
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
 
 
@@ -57,8 +58,8 @@ REFUSED = {
         r"no errors: 'pin1.position'\n.*give pin1.offset_t, pin1.offset_z, pin1.tilt_t, pin1.tilt_z$",
     ),
     "clearance beside diameter": (
-        "pin1.diameter [um],pin1.clearance [um]\n1,2\n",
-        r"cross.csv:1: pin1.clearance: is given beside pin1.diameter\n.*remove one of the two columns",
+        "pin1.diameter [um],hole4.diameter [um],pin2.clearance [um],pin1.clearance [um]\n1,0,3,2\n",
+        r"cross.csv:1: pin1.clearance: is given beside pin1.diameter\n.*remove one or the other",
     ),
     "no unit": ("pin1.tilt_z\n0.1\n", r"cross.csv:1: pin1.tilt_z: has no unit\n.*header: pin1.tilt_z \[deg\]"),
     "nothing measured": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,9 @@ from tolstat.common.mechanism import Mechanism, features
 from tolstat.common.text_table import TextTable
 from tolstat.study.axes import columns_of, zone_units
 from tolstat.study.selection import error_units, excludes, given_units, halves, suggestion
+
+_PART = re.compile(r"(?:.*\.)?(?:pin|hole)\d+")
+"""Names of pins and holes, of which there may be others."""
 
 
 class Crosses(NamedTuple):
@@ -69,25 +73,26 @@ def read(
     others = [name for name in table.columns if name not in columns]
     results = [name for name in others if name in {column.name for column in result_columns(mechanism)}]
     zones = zone_units(mechanism)
-    parts, ends = ({halves(name)[k] for name in (*zones, *given_units(mechanism))} for k in (0, 1))
-    strange = [name for name in others if "." in name and name not in (*results, *error_units(mechanism))]
-    halved = {name: halves(name.casefold()) for name in strange}
-    if wrong := [name for name, (part, end) in halved.items() if part in parts or end in ends]:
+    known, parts = {*results, *error_units(mechanism)}, {halves(name)[0] for name in zones}
+    part_of = {name: halves(name.casefold())[0] for name in others if "." in name and name not in known}
+    if wrong := [name for name, part in part_of.items() if part in parts or _PART.fullmatch(part)]:
         instead = f"give {', '.join(columns_of(wrong[0]))}" if wrong[0] in zones else suggestion(wrong[0], list(units))
         names = ", ".join(map(repr, wrong))
         table.fault(table.head, "", f"has columns that are no errors: {names}", f"remove or rename them: {instead}")
     elif not columns and not needed:
         remedy = f"write names such as {next(iter(varied), next(iter(units)))}; there are {', '.join(others) or 'none'}"
         table.fault(table.head, "", "has no column of an error", remedy)
-    instead_of = {name: column for column in columns for name in excludes(mechanism).get(column, ())}
-    for name in (name for name in columns if name.endswith(".clearance") and name in instead_of):
-        table.fault(table.head, name, f"is given beside {instead_of[name]}", "remove one of the two columns")
+    given = {name for name, values in columns.items() if values.any()}
+    for name, diameters in excludes(mechanism).items():
+        if name.endswith(".clearance") and name in given and (beside := sorted(given & set(diameters))):
+            table.fault(table.head, name, f"is given beside {' and '.join(beside)}", "remove one or the other")
     if single and len(table.rows) > 1:
         table.fault(table.rows[1][0], "", "is a second joint", "give one row a file, or all to: tolstat evaluate STUDY")
     table.check()
     left_out = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
     notes = [f"columns left out: {', '.join(left_out)}"] if left_out else []
-    if lacking := len(set(varied) - columns.keys() - instead_of.keys()):
+    told = {*columns, *(other for name in columns for other in excludes(mechanism).get(name, ()))}
+    if lacking := len(set(varied) - told):
         notes.append(f"{lacking} error{'s' * (lacking > 1)} not measured: taken as nominal")
     return Crosses(columns, [line for line, _ in table.rows], [f"{path}: {note}" for note in notes])
 

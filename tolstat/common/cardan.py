@@ -81,9 +81,9 @@ def series(number: int) -> Mechanism:
 
 SERIES = series(2)
 """Two joints in series."""
-PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral")
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
-its first and its last shaft; unbalance of the last one, and displacement of it across its axis."""
+its first and its last shaft; unbalance of the last one, displacement of it across its axis, a spline that sticks."""
 
 
 def named(base: Mechanism, parts: Collection[str]) -> str:
@@ -103,6 +103,7 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
         unbalance="unbalance" in parts,
+        spline="spline" in parts,
     )
 
 

@@ -183,6 +183,8 @@ class Mechanism(NamedTuple):
         Whether pins rub in their holes.
     unbalance : bool
         Whether the last shaft has an unbalance.
+    spline : bool
+        Whether the last shaft has a spline that sticks.
     waves : int
         Number of orders in the series of its members' angles.
     loaded : str
@@ -201,6 +203,7 @@ class Mechanism(NamedTuple):
     faces: tuple[Face, ...] = ()
     friction: bool = False
     unbalance: bool = False
+    spline: bool = False
     waves: int = 0
     loaded: str = ""
 

@@ -234,6 +234,9 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             Field("shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
             Field("shaft.unbalance_angle", "rad", "deviation of its direction"),
         ]
+    if mechanism.spline:
+        text = "axial force of the sticking spline over 2 mu T/d, from -1 to 1"
+        fields.append(Field("shaft.spline", "1", text))
     if mechanism.friction:
         fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
     for prefix in prefixes(mechanism) if mechanism.faces else ():

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
     from tolstat.joint.perturbation import MEANS as MEANS
+    from tolstat.joint.perturbation import SPLINE as SPLINE
     from tolstat.joint.perturbation import Operation as Operation
     from tolstat.joint.perturbation import OperationInSeries as OperationInSeries
     from tolstat.joint.perturbation import Series as Series
@@ -28,7 +29,7 @@ _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": (
-        *("MEANS", "Operation", "OperationInSeries", "Series"),
+        *("MEANS", "SPLINE", "Operation", "OperationInSeries", "Series"),
         *("mechanism_of", "nominal_errors", "operating", "perturb"),
     ),
     "reading": ("load", "varied"),

@@ -24,7 +24,7 @@ from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import RIGID, Arm, Bushing, Pin
+from tolstat.joint.sections import RIGID, Arm, Bushing, Pin, Spline
 
 Table = NDArray[np.void]
 
@@ -118,6 +118,8 @@ class OperationInSeries(Operation):
 
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
+SPLINE = "shaft.spline"
+"""Error of a joint with `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
@@ -140,15 +142,21 @@ def nominal_errors(n: int, mechanism: Mechanism) -> Table:
     return errors
 
 
-def operating(operation: Operation, errors: Table) -> dict[str, Array]:
+def operating(operation: Operation, errors: Table, spline: Spline | None = None) -> dict[str, Array]:
     """Values that joints have at an operating point: those of the point, and each joint's deviations from them.
+
+    The axial force includes that of the `spline`, which follows each joint's torque.
 
     Returns
     -------
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
+    values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
+    if spline is not None:
+        largest = 2.0 * spline.mu * np.abs(values["torque"]) / spline.diameter
+        values["axial_force"] = values["axial_force"] + errors[SPLINE] * largest
+    return values
 
 
 def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
@@ -176,7 +184,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     params = blank_params(len(errors), mechanism)
     for name, value in _constants(joint).items():
         params[name] = value
-    point = operating(operation, errors)
+    point = operating(operation, errors, joint.shaft.spline)
     params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     if isinstance(operation, OperationInSeries):
         series = operation.series

@@ -20,7 +20,7 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import Joint, Operation, OperationInSeries, Series, orders
+from tolstat.joint import SPLINE, Joint, Operation, OperationInSeries, Series, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
 from tolstat.joint.sections import RIGID
@@ -259,7 +259,8 @@ class Setting(NamedTuple):
 
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
+        pulled = {FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0
+        return self.joint.shaft.slides and bool(pulled)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -281,6 +282,7 @@ def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[K
     """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        paths += [("joint", "shaft", "spline")] * any(setting.joint.shaft.spline for setting in settings)
         free = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         remedy = "remove it" if _in_series(settings) else free
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):

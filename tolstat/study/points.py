@@ -316,14 +316,12 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
         yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
     for path in dict.fromkeys((*setting.path, "partner") for setting in of_shafts if setting.operation.partner):
-        found = "stands beside [shaft]: both joints are simulated, none stands for the other"
-        yield path, found, "remove it, or [shaft]"
+        yield path, "stands beside [shaft], which simulates both joints", "remove it, or [shaft]"
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"
         yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
     if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
-        found = "is free beside a spline, which slides, too: nothing holds the shaft along its axis"
-        yield ("joint", "shaft", "axial"), found, 'write axial = "rigid", or remove shaft.spline'
+        yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
     if any(setting.joint.shaft.spline for setting in of_shafts):
         yield (
             ("joint", "shaft", "spline"),

@@ -169,9 +169,12 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
             ["variant.partner: stands beside [shaft], which simulates both joints | remove it, or [shaft]"],
         ),
         (
-            WHOLE.replace("[operation]", f"{FREE}[operation]") + SPLINE + '[solver]\nfidelity = "ideal"\n',
-            ['joint.shaft.axial: is free beside a spline: nothing holds the shaft | write axial = "rigid"',
-             "solver.fidelity: 'ideal' does not hold for a drive shaft: its closed forms are those of one joint | "
+            WHOLE.replace("[operation]", f"{FREE}[operation]") + SPLINE,
+            ['joint.shaft.axial: is free beside a spline: nothing holds the shaft | write axial = "rigid"'],
+        ),
+        (
+            WHOLE + '[solver]\nfidelity = "ideal"\n',
+            ["solver.fidelity: 'ideal' does not hold for a drive shaft: its closed forms are those of one joint | "
              'write "quasistatic" or "dynamic"'],
         ),
         (

@@ -11,8 +11,8 @@ from tests.support.graphs import cardan, free_tube
 from tests.support.mechanisms import body, triads, unknown
 from tests.support.of_cardan import PARAM
 from tolstat.common import files
-from tolstat.common.cardan import CARDAN, SERIES
-from tolstat.common.mechanism import Mechanism, blocks_of, numbering
+from tolstat.common.cardan import CARDAN, SHAFT, SPLINED
+from tolstat.common.mechanism import Mechanism, numbering
 from tolstat.common.tables import blank_params
 
 FRAMES = {"C": "cross", "I": "input", "F": "output"}
@@ -66,7 +66,7 @@ def test_bushings_carry_pins_on_the_hub_and_arms_on_their_shaft() -> None:
         assert member[bushing.lump] == member[base]
 
 
-@pytest.fixture(params=[CARDAN, SERIES], ids=["cardan", "in series"])
+@pytest.fixture(params=[CARDAN, SHAFT, SPLINED], ids=["cardan", "shaft", "splined shaft"])
 def mechanism(request: pytest.FixtureRequest) -> Mechanism:
     return request.param
 
@@ -113,19 +113,21 @@ def test_a_bushing_between_lumps_has_a_block_of_its_own(mechanism: Mechanism) ->
     assert (numbers["bushing_block"] >= 0).tolist() == joins
 
 
-def test_shafts_that_turn_as_one_are_joined_to_the_arms_of_both_forks() -> None:
-    """Of two joints in series psi of the tube; of each the holes are eliminated first, and the hub last."""
-    numbers, mechanism = numbering(SERIES), SERIES
-    assert numbers["turn"].tolist() == [-1, 0, 0, 1]
-    touched = {
-        (mechanism.unknowns[u], mechanism.bodies[lump])
-        for step, lump in enumerate(numbers["step_lump"])
-        for u in numbers["column"][slice(*numbers["column_first"][step : step + 2])]
+def test_arms_of_both_joints_hold_the_tube() -> None:
+    """Psi is that of the output; tubes are lumps that the arms of the forks on them are joined to, and one another."""
+    numbers, bodies = numbering(SPLINED), SPLINED.bodies
+    assert numbers["turn"].tolist() == [-1, 0]
+    held = {(one.lump, one.base) for one in SPLINED.bushings if one.base.startswith("tube")}
+    assert held == {
+        *(("joint1.hole3", "tube1"), ("joint1.hole4", "tube1"), ("joint2.hole1", "tube2"), ("joint2.hole2", "tube2")),
+        ("tube2", "tube1"),
     }
-    holes = {name for unknown_name, name in touched if "hole" in name and unknown_name == "psi1"}
-    assert holes == {"joint1.hole3", "joint1.hole4", "joint2.hole1", "joint2.hole2"}
-    assert {name for unknown_name, name in touched if "hub" in name and unknown_name == "psi2"} == {"joint2.hub"}
-    assert blocks_of(mechanism) == 2 * blocks_of(CARDAN)
+    assert [SPLINED.bushings[i].name for i in numbers["pushed"]] == ["spline"]
+    assert numbers["pushed"].size == 1
+    assert numbering(SHAFT)["pushed"].size == 0
+    assert {SHAFT.lumps[i].member for i in range(18) if bodies[i] in ("joint2.hole1", "joint2.hole2")} == {
+        "joint1.output"
+    }
 
 
 def test_the_plan_is_that_of_the_graph() -> None:
@@ -133,5 +135,5 @@ def test_the_plan_is_that_of_the_graph() -> None:
     plan, numbers = cardan().plan(), numbering(CARDAN)
     for name, values in plan.items():
         np.testing.assert_array_equal(numbers[name], values, err_msg=name)
-    assert free_tube().lumps == len(SERIES.lumps) + 1
+    assert free_tube().lumps == len(SHAFT.lumps)
     assert body("hub") == 0

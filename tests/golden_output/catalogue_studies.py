@@ -118,13 +118,13 @@ SHAFT = Campaign(
         "page": ["report drive_shaft.h5 --out page.html --accept '30 %' --replay 20"],
     },
 )
-SERIES = Campaign(
-    "series",
-    ["run series.toml --n 24"],
+TRUCK = Campaign(
+    "shaft",
+    ["run shaft.toml --n 24"],
     {
-        "report": ["report series.h5 --wide --accept '30 %'"],
-        "worst": ["worst series.h5 --top 3"],
-        "bearing_life": ["bearing-life series.h5"],
+        "report": ["report shaft.h5 --wide --accept '30 %'"],
+        "worst": ["worst shaft.h5 --top 3"],
+        "bearing_life": ["bearing-life shaft.h5"],
     },
 )
 RINGS = Campaign(

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from tests.support.held import drive_shaft
 from tests.support.mechanisms import bushing_kind, lump_kind
 from tolstat import joint as joints
 from tolstat.common import files
@@ -413,13 +414,14 @@ def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
     ]
 
 
-def test_equal_joints_in_series_turn_the_output_evenly(joint):
-    """Planes half a turn apart and no offset are a study's default; at 90 deg of offset both joints' swings add up."""
+def test_equal_joints_of_a_shaft_turn_the_output_evenly(joint):
+    """In Z and in W arrangement without offset; at 90 deg of offset both joints' swings add up."""
     theta = np.linspace(0.0, 2 * np.pi, 37)
     point = joints.Operation(alpha="20 deg", speed="500 rpm", torque="100 N*m")
-    for offset, swing in (("0 deg", 0.0), ("90 deg", 1 / np.cos(np.radians(20)) ** 2 - 1)):
-        own = joints.Series(alpha="20 deg", inertia="0.01 kg*m^2", offset=offset)
-        both = joints.OperationInSeries.model_construct(**dict(point), series=own)
-        par = joints.perturb(joint, both, joints.nominal_errors(1, joints.mechanism_of(joint, both)))[0]
-        ratio = ideal.ratio_of_all(theta, par)
-        assert_allclose(ratio.max() - 1, swing, atol=1e-12)
+    for arrangement in ("Z", "W", "40 deg"):
+        for offset, swing in (("0 deg", 0.0), ("90 deg", 1 / np.cos(np.radians(20)) ** 2 - 1)):
+            shaft = drive_shaft(np.radians(20), arrangement, offset=offset)
+            both = joints.OperationOfShaft.model_construct(**dict(point), shaft=shaft)
+            par = joints.perturb(joint, both, joints.nominal_errors(1, joints.mechanism_of(joint, both)))[0]
+            ratio = ideal.ratio_of_all(theta, par)
+            assert_allclose(ratio.max() - 1, swing, atol=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support import naive
-from tests.support.held import FACES, FREE, FRICTION, held
+from tests.support.held import FACES, FREE, FRICTION, drive_shaft, held
 from tests.support.kernel_states import dense
 from tolstat import joint as joints
 from tolstat.common.load_kinds import spans
@@ -16,31 +16,26 @@ from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.mechanics.work import FORCE, make_work
 
 OPTIONS = Options()
-SERIES = joints.Series.model_construct(alpha=0.2, offset=0.1, inertia=0.004)
+WHOLE = {"thrust": FACES | {"end_play": "0 mm"}, "friction": FRICTION, "shaft": FREE}
 ACROSS = {"lateral": "2e7 N/m", "mass": "5 kg", "unbalance": {"amount": "1e-3 kg*m", "angle": "30 deg"}}
-MECHANISMS = pytest.mark.parametrize("series", [None, SERIES], ids=["joint", "series"])
+MECHANISMS = pytest.mark.parametrize("drive", [None, drive_shaft(0.2, offset="0.1 rad")], ids=["joint", "shaft"])
 
 
-def state(seed: int, series: joints.Series | None = None, turned: float = 5e-3, **sections):
+def state(seed: int, drive: joints.DriveShaft | None = None, turned: float = 5e-3, **sections):
     """A joint, or two, with errors in the midst of contact: parameters, mechanism, time, q and v at random."""
     rng = np.random.default_rng(seed)
-    names = held(series=series, **sections)[1]
+    names = held(drive_shaft=drive, **sections)[1]
     errors = {}
     for pair in names.pairs:
         for feature in (pair.pin, pair.hole):
             errors |= {f"{feature}.offset_{axis}": rng.normal(0, 2e-5) for axis in "etz"}
             errors |= {f"{feature}.tilt_{axis}": rng.normal(0, 2e-3) for axis in "tz"}
-    rows, mechanism = held(errors, alpha=0.4, speed=80.0, series=series, **sections)
+    rows, mechanism = held(errors, alpha=0.4, speed=80.0, drive_shaft=drive, **sections)
     par, lumps = rows[0], len(mechanism.lumps)
     par.clearance[:] = 1e-5
     q, v = rng.normal(0, 2e-5, mechanism.dof), rng.normal(0, 1e-2, mechanism.dof)
     q[: 6 * lumps].reshape(lumps, 6)[:, 3:] = rng.normal(0, turned, (lumps, 3))
     return par, mechanism, 0.017, q, v
-
-
-def sections_of(series: joints.Series | None) -> dict:
-    shaft = {} if series else {"shaft": FREE}  # joints in series have theirs held
-    return {"thrust": FACES | {"end_play": "0 mm"}, "friction": FRICTION, **shaft}
 
 
 def test_a_shaft_that_moves_across_has_the_accelerations_and_loads_of_the_twin() -> None:
@@ -62,8 +57,8 @@ def test_a_shaft_that_moves_across_has_the_accelerations_and_loads_of_the_twin()
 
 @MECHANISMS
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_accelerations_and_loads_are_those_of_the_naive_twin(series, seed: int) -> None:
-    par, mechanism, t, q, v = state(seed, series, **sections_of(series))
+def test_accelerations_and_loads_are_those_of_the_naive_twin(drive, seed: int) -> None:
+    par, mechanism, t, q, v = state(seed, drive, **WHOLE)
     work, a = make_work(mechanism), np.full(mechanism.dof, np.nan)
     dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
     expected, largest = naive.forces(t, q, v, par, mechanism), np.abs(work.force).max()
@@ -108,7 +103,7 @@ def without(name: str, case):
 
 def test_tangent_of_faces_is_the_slope_of_their_forces() -> None:
     """Stiffness and damping; what it leaves out, the turning of a face with its hole, is a per mille of it."""
-    case, cv = state(1, turned=1e-4, **sections_of(None) | {"friction": {}}), 2000.0
+    case, cv = state(1, turned=1e-4, **WHOLE | {"friction": {}}), 2000.0
     bare = without("face_k", without("face_c", case))
     expected = slopes(1.0, cv, case) - slopes(1.0, cv, bare)
     found = assembled(cv, case) - assembled(cv, bare)
@@ -118,7 +113,7 @@ def test_tangent_of_faces_is_the_slope_of_their_forces() -> None:
 def test_tangent_of_friction_is_its_slope_by_velocity() -> None:
     """Forces that press held: they have no damping here, so that they do not change with v."""
     friction = FRICTION | {"slip_speed": "0.5 m/s"}  # pins slide as fast: the slope along it counts, and differs
-    case = without("c_d", state(1, turned=1e-4, **sections_of(None) | {"friction": friction}))
+    case = without("c_d", state(1, turned=1e-4, **WHOLE | {"friction": friction}))
     cv = 2000.0
     bare = without("mu", case)
     expected = cv * (slopes(0.0, 1.0, case) - slopes(0.0, 1.0, bare))

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``series.h5``, ``snap_rings.h5``, and,
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``snap_rings.h5``, and,
 compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of
 each, and ``tilted_pin.png``.
 """
@@ -184,23 +184,23 @@ def lots(folder: Path) -> None:
     save(figure, folder / "lots.png")
 
 
-def series(folder: Path) -> None:
-    """Draw the share of pairs above the largest force on the cross of each of two joints, with 95 % intervals."""
+def shaft(folder: Path) -> None:
+    """Draw the share of shafts above the largest force of a bearing at each end, with 95 % intervals."""
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    with tolstat.open(folder / "series.h5") as store:
+    with tolstat.open(folder / "shaft.h5") as store:
         view = store.view()
-        for joint, colour in (("joint1", "#0072B2"), ("joint2", "#D55E00")):
-            force = np.max([view.load(f"{joint}.cross{i}.F").values for i in range(1, 5)], axis=0)
+        for end, label, colour in (("input", "gearbox", "#0072B2"), ("output", "axle", "#D55E00")):
+            force = np.max([view.load(f"{end}.bearing_{bearing}").values for bearing in "ab"], axis=0)
             count = np.arange(force.size, 0, -1)
-            ax.step(np.sort(force), 100 * count / force.size, color=colour, where="pre", label=joint)
+            ax.step(np.sort(force), 100 * count / force.size, color=colour, where="pre", label=label)
             lower, upper = clopper_pearson(count, force.size)
             ax.fill_between(np.sort(force), 100 * lower, 100 * upper, color=colour, step="pre", alpha=0.2, lw=0)
-        ax.axvline(view.limits["joint1.cross1.F"], color="#333333", ls="--", label="limit")
-    ax.set(xlabel="largest force on the cross (N)", ylabel="pairs above it (%)", yscale="log", ylim=(0.3, 150))
+        ax.axvline(view.limits["input.bearing_a"], color="#333333", ls="--", label="limit")
+    ax.set(xlabel="largest force of a bearing (N)", ylabel="shafts above it (%)", yscale="log", ylim=(0.3, 150))
     ax.set_yticks([1, 10, 100], ["1", "10", "100"])
     ax.grid(alpha=0.3)
     ax.legend()
-    save(figure, folder / "series.png")
+    save(figure, folder / "shaft.png")
 
 
 def snap_rings(folder: Path) -> None:
@@ -315,7 +315,7 @@ def main(folder: Path) -> None:
         duty_cycle,
         known_parts,
         lots,
-        series,
+        shaft,
         snap_rings,
     )
     for draw in (*drawn, rigid_shafts, line_bored):

@@ -16,10 +16,8 @@ import tolstat
 from tests.kernel.test_bearing_line import LINE
 from tests.kernel.test_bearing_line import parameters as of_line
 from tests.support import linkages, naive
-from tests.support.environment import ROOT
 from tests.support.mechanisms import triads
-from tolstat import study
-from tolstat.common.cardan import CARDAN, SERIES
+from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import (
     ALONG_Z,
     DRIVEN,
@@ -35,7 +33,6 @@ from tolstat.common.mechanism import (
 )
 from tolstat.common.tables import blank_params
 from tolstat.display import drawing
-from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.drawings import plain
 from tolstat.questions.drawings.plain import MARKED, VIEWS, Frame
 
@@ -82,12 +79,6 @@ def of_four_bar():
     return par, group
 
 
-@pytest.fixture(scope="module")
-def of_series():
-    read = study.load(ROOT / "studies" / "series.toml")
-    return perturb(read.joint, read.operation, nominal_errors(1, SERIES)).view(np.recarray)
-
-
 def drawn(panel):
     """Points of what is drawn, by name, and the figure."""
     figure = Figure(figsize=panel.size)
@@ -97,21 +88,18 @@ def drawn(panel):
     return {line.get_gid(): line for line in figure.findobj(Line2D) if line.get_gid()}, figure
 
 
-def test_frames_are_those_of_the_naive_twin(params, of_series) -> None:
-    """The twin has each joint in axes of its own, too."""
-    for mechanism, row, groups in ((CARDAN, params(0.3)[0], 1), (SERIES, of_series[0], 2)):
-        found = plain.frames(mechanism, row)
-        assert len(found) == groups
-        for member, expected in zip(mechanism.members, naive.frames(0.0, row, mechanism), strict=True):
-            (frame,) = (group[member.name] for group in found if member.name in group)
-            np.testing.assert_allclose(frame.attitude, expected, atol=1e-14)
-            assert not frame.origin.any()
+def test_frames_are_those_of_the_naive_twin(params) -> None:
+    row = params(0.3)[0]
+    found = plain.frames(CARDAN, row)
+    for member, expected in zip(CARDAN.members, naive.frames(0.0, row), strict=True):
+        np.testing.assert_allclose(found[member.name].attitude, expected, atol=1e-14)
+        assert not found[member.name].origin.any()
 
 
 def test_pins_forks_and_shafts_of_a_cardan_joint(params, cirelli) -> None:
     """A fork's line goes from the hole along the arm to its bushing and from there to the axis of the shaft."""
     row, alpha = params(0.3)[0], 0.3
-    found, _ = drawn(*plain.views(CARDAN, row, plain.frames(CARDAN, row)))
+    found, _ = drawn(plain.views(CARDAN, row, plain.frames(CARDAN, row)))
     R, l_f = 1e3 * cirelli.cross.R, 1e3 * cirelli.arm.l_f
     places = np.array([(0, R, 0), (0, -R, 0), (R, 0, 0), (-R, 0, 0)])
     output = np.array([np.sin(alpha), 0.0, np.cos(alpha)])
@@ -127,8 +115,7 @@ def test_pins_forks_and_shafts_of_a_cardan_joint(params, cirelli) -> None:
 
 def test_a_shaft_in_three_bearings_lies_along_its_pins() -> None:
     row = of_line(0.0)[0]
-    (group,) = plain.frames(LINE, row)
-    found, _ = drawn(*plain.views(LINE, row, [group]))
+    found, _ = drawn(plain.views(LINE, row, plain.frames(LINE, row)))
     for i, z in enumerate((-200.0, 0.0, 200.0), 1):
         np.testing.assert_allclose(found[f"side.pin{i}"].get_xydata(), [(z, 0.0)], atol=1e-9)
     for shaft in ("shaft", "bearings"):
@@ -137,7 +124,7 @@ def test_a_shaft_in_three_bearings_lies_along_its_pins() -> None:
 
 def test_members_stand_where_their_frames_have_them() -> None:
     par, group = of_four_bar()
-    found, figure = drawn(*plain.views(FOUR_BAR, par[0], [group]))
+    found, figure = drawn(plain.views(FOUR_BAR, par[0], group))
     for name, place in ENDS.items():
         for view, axes in VIEWS.items():
             np.testing.assert_allclose(
@@ -154,35 +141,25 @@ def test_members_stand_where_their_frames_have_them() -> None:
         )
 
 
-def test_groups_have_one_scale_and_axes_with_their_unit(of_series) -> None:
-    row = of_series[0]
-    scales = []
-    for panel in plain.views(SERIES, row, plain.frames(SERIES, row)):
-        _, figure = drawn(panel)
-        for view in figure.axes[0].child_axes:
-            scales.append(view.get_window_extent().width / np.ptp(view.get_xlim()))
-        labels = [
-            (view.get_title(loc="left"), view.get_xlabel(), view.get_ylabel()) for view in figure.axes[0].child_axes
-        ]
-        assert labels == [
-            ("side", "z [mm]", "x [mm]"),
-            ("top", "z [mm]", "y [mm]"),
-            ("front", "x [mm]", "y [mm]"),
-        ]
-    assert scales == pytest.approx([scales[0]] * 6)
+def test_views_have_one_scale_and_axes_with_their_unit(params) -> None:
+    row = params(0.3)[0]
+    _, figure = drawn(plain.views(CARDAN, row, plain.frames(CARDAN, row)))
+    views = figure.axes[0].child_axes
+    labels = [(view.get_title(loc="left"), view.get_xlabel(), view.get_ylabel()) for view in views]
+    assert labels == [("side", "z [mm]", "x [mm]"), ("top", "z [mm]", "y [mm]"), ("front", "x [mm]", "y [mm]")]
+    scales = [view.get_window_extent().width / np.ptp(view.get_xlim()) for view in views]
+    assert scales == pytest.approx([scales[0]] * 3)
 
 
-def test_what_is_marked_stands_out_in_its_group(of_series) -> None:
-    row, marked = of_series[0], ["joint1.cross2", "joint2.pin3", "joint2.output"]
-    first, second = plain.views(SERIES, row, plain.frames(SERIES, row), marked)
-    assert first.description.endswith("Marked: joint1.cross2.")
-    assert second.description.endswith("Marked: joint2.output, joint2.pin3.")
-    for panel, own in ((first, marked[:1]), (second, marked[1:])):
-        found, figure = drawn(panel)
-        looks = {name.partition(".")[2].removesuffix(".line") for name, line in found.items() if is_marked(line)}
-        assert looks == set(own)
-        bold = [text.get_text() for text in figure.findobj(Annotation) if text.get_fontweight() == "bold"]
-        assert sorted(bold) == sorted([name.partition(".")[2] for name in own] * 3)
+def test_what_is_marked_stands_out(params) -> None:
+    row, marked = params(0.3)[0], ["cross2", "output"]
+    panel = plain.views(CARDAN, row, plain.frames(CARDAN, row), marked)
+    assert panel.description.endswith("Marked: cross2, output.")
+    found, figure = drawn(panel)
+    looks = {name.partition(".")[2].removesuffix(".line") for name, line in found.items() if is_marked(line)}
+    assert looks == set(marked)
+    bold = [text.get_text() for text in figure.findobj(Annotation) if text.get_fontweight() == "bold"]
+    assert sorted(bold) == sorted(marked * 3)
     words = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
     assert words == {"input", "cross", "output", "bushing", "pin in its hole"}
 
@@ -191,26 +168,25 @@ def is_marked(line) -> bool:
     return MARKED.lower() in (to_hex(line.get_color()), to_hex(line.get_markeredgecolor()))
 
 
-@pytest.mark.parametrize("which", ["series", "line", "four-bar"])
-def test_views_and_names_are_inside_the_picture_and_apart(of_series, which: str) -> None:
+@pytest.mark.parametrize("which", ["line", "four-bar"])
+def test_views_and_names_are_inside_the_picture_and_apart(which: str) -> None:
     par, group = of_four_bar()
-    mechanism, row, groups, pins = {
-        "series": (SERIES, of_series[0], None, {"pin1", "pin2", "pin3", "pin4"}),
-        "line": (LINE, of_line(0.0)[0], None, {"pin1", "pin2", "pin3"}),
-        "four-bar": (FOUR_BAR, par[0], [group], {"pinA", "pinB", "pinC", "pinD"}),
+    line = of_line(0.0)[0]
+    mechanism, row, frames, pins = {
+        "line": (LINE, line, plain.frames(LINE, line), {"pin1", "pin2", "pin3"}),
+        "four-bar": (FOUR_BAR, par[0], group, {"pinA", "pinB", "pinC", "pinD"}),
     }[which]
-    for panel in plain.views(mechanism, row, groups or plain.frames(mechanism, row)):
-        _, figure = drawn(panel)
-        views, legend = figure.axes[0].child_axes, figure.axes[0].get_legend()
-        boxes = [view.get_tightbbox(figure.canvas.get_renderer()) for view in views]
-        boxes.append(legend.get_window_extent())
-        for box in boxes:
-            assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
-            assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
-        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
-        for view in views:
-            named = {name for text in view.texts for name in text.get_text().split(", ")}
-            assert named == pins
+    _, figure = drawn(plain.views(mechanism, row, frames))
+    views, legend = figure.axes[0].child_axes, figure.axes[0].get_legend()
+    boxes = [view.get_tightbbox(figure.canvas.get_renderer()) for view in views]
+    boxes.append(legend.get_window_extent())
+    for box in boxes:
+        assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    for view in views:
+        named = {name for text in view.texts for name in text.get_text().split(", ")}
+        assert named == pins
 
 
 def test_a_figure_of_the_package() -> None:
@@ -223,9 +199,9 @@ def test_members_of_a_linkage_lie_where_the_twin_has_them() -> None:
     mechanism = linkages.mechanism_of("bennett")
     row = linkages.parameters("bennett", mechanism)[0]
     attitudes, origins = naive.placed(0.0, row, mechanism)
-    [group] = plain.frames(mechanism, row)
+    group = plain.frames(mechanism, row)
     for i, member in enumerate(mechanism.members):
         np.testing.assert_allclose(group[member.name].attitude, attitudes[i], atol=1e-12)
         np.testing.assert_allclose(group[member.name].origin, origins[i], atol=1e-12)
-    found, _ = drawn(*plain.views(mechanism, row, [group]))
+    found, _ = drawn(plain.views(mechanism, row, group))
     assert found

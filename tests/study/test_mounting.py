@@ -10,7 +10,7 @@ import pytest
 from tests.support.of_cardan import without_results
 from tolstat import sampling, study
 from tolstat.campaign import remedy
-from tolstat.common.cardan import MECHANISMS
+from tolstat.common.cardan import CARDAN, MECHANISMS
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation
 from tolstat.joint import operating, perturb
@@ -189,12 +189,12 @@ def test_auto_tries_closed_forms_where_they_hold(closed_form: bool) -> None:
 
 
 def test_a_note_where_rigid_shafts_decide() -> None:
-    said = note_on_shafts(["pin1.offset_t", "pin1.offset_z"], ["rigid"], "tolstat run x")
+    said = note_on_shafts(["pin1.offset_t", "pin1.offset_z"], ["rigid"], CARDAN, "tolstat run x")
     assert said.endswith("With a free output shaft: tolstat run x")
-    assert note_on_shafts(["hole2.position_inner"], ["rigid", "rigid"], "x")
-    assert not note_on_shafts(["pin1.offset_t", "hole1.tilt_z"], ["rigid"], "x")
-    assert not note_on_shafts(["pin1.offset_z"], ["rigid", "free"], "x")
-    assert not note_on_shafts(["pin1.offset_z"], [2e7], "x")
+    assert note_on_shafts(["hole2.position_inner"], ["rigid", "rigid"], CARDAN, "x")
+    assert not note_on_shafts(["pin1.offset_t", "hole1.tilt_z"], ["rigid"], CARDAN, "x")
+    assert not note_on_shafts(["pin1.offset_z"], ["rigid", "free"], CARDAN, "x")
+    assert not note_on_shafts(["pin1.offset_z"], [2e7], CARDAN, "x")
 
 
 def test_a_note_where_nothing_holds_pins_along_their_holes() -> None:

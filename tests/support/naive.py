@@ -41,29 +41,42 @@ def joint_frames(theta, alpha):
 
 def frames(theta, par, mechanism=CARDAN):
     """Attitudes of the members, (n, 3, 3), where the input is at `theta`."""
-    if mechanism.placed:
-        return placed(theta, par, mechanism)[0]
+    return poses(theta, par, mechanism)[0]
+
+
+def poses(theta, par, mechanism):
+    """Attitudes, (n, 3, 3), and origins, (n, 3), of the members, where the input is at `theta`."""
+    return placed(theta, par, mechanism) if mechanism.placed else driveline(theta, par, mechanism)
+
+
+def driveline(theta, par, mechanism):
+    """Poses of Cardan joints one behind the other, each bent in its own plane, and of members beside them."""
     found = [turn(Z, {HELD: 0.0, DRIVEN: theta}.get(member.motion, np.nan)) for member in mechanism.members]
-    names = [member.name for member in mechanism.members]
-    for name, alpha, ahead in zip(mechanism.cardan, par.alpha, par.ahead, strict=True):
-        first, theta = names.index(name), theta + ahead
-        found[first : first + 3] = joint_frames(theta, alpha)
-        output = turn((0, -1, 0), alpha) @ found[first + 2]
+    origin, names = np.zeros((len(found), 3)), [member.name for member in mechanism.members]
+    plane, centre = np.eye(3), np.zeros(3)
+    for joint, name in enumerate(mechanism.cardan):
+        plane = plane @ turn(Z, par.plane[joint])
+        centre, theta = centre + par.span[joint] * plane @ Z, theta + par.ahead[joint]
+        first = names.index(name)
+        found[first : first + 3] = plane @ joint_frames(theta, par.alpha[joint])
+        origin[first : first + 3] = centre
+        plane = plane @ turn((0, 1, 0), par.alpha[joint])
+        output = plane.T @ found[first + 2]
         theta = np.arctan2(output[1, 0], output[0, 0])
-    return np.array(found)
+    return np.array(found), origin
 
 
 def placed(theta, par, mechanism):
     """Attitudes, (n, 3, 3), and origins, (n, 3), of members that have a place in their parents."""
-    poses = {"": (np.eye(3), np.zeros(3))}
+    pose = {"": (np.eye(3), np.zeros(3))}
     for i, member in enumerate(mechanism.members):
-        attitude, origin = poses[member.parent]
+        attitude, origin = pose[member.parent]
         order = np.arange(1, mechanism.waves + 1)
         series = par.wave[i, :, 0] @ np.cos(order * theta) + par.wave[i, :, 1] @ np.sin(order * theta)
         of_series = par.angle[i, 0] + par.angle[i, 1] * theta + series
         angle = {HELD: 0.0, DRIVEN: theta, SERIES: of_series}[member.motion]
-        poses[member.name] = attitude @ par.mount[i] @ turn(Z, angle), origin + attitude @ par.pivot[i]
-    return tuple(np.array([poses[member.name][k] for member in mechanism.members]) for k in range(2))
+        pose[member.name] = attitude @ par.mount[i] @ turn(Z, angle), origin + attitude @ par.pivot[i]
+    return tuple(np.array([pose[member.name][k] for member in mechanism.members]) for k in range(2))
 
 
 def input_angle(phase, par):
@@ -91,10 +104,7 @@ def ideal_attitudes(t, par, mechanism):
 
 def origins(t, par, mechanism):
     """Origins of the ideal frames of all bodies at one time, (bodies, 3)."""
-    of = members_of_bodies(mechanism)
-    if not mechanism.placed:
-        return np.zeros((len(of), 3))
-    return placed(input_angle(par.omega * t, par), par, mechanism)[1][of]
+    return poses(input_angle(par.omega * t, par), par, mechanism)[1][members_of_bodies(mechanism)]
 
 
 def triads_of(par, mechanism):
@@ -308,6 +318,7 @@ def loads_between(now, par, mechanism):
         rate = vector_rate(relative, attitude[base].T @ (now.spin[lump] - now.spin[base]))
         load = -par.k[kind] * np.concatenate([x, local @ phi])
         load -= par.c[kind] * np.concatenate([to_marker @ moving, local @ rate])
+        load[2] += par.push * bushing.pushed
         f, torque = to_marker.T @ load[:3], to_marker.T @ load[3:]
         apply(lump, f, torque, marker)
         apply(base, -f, -torque, marker)
@@ -377,7 +388,8 @@ def across_shaft(t, q, v, k, own, par, mechanism):
     """Force across shaft k along x and y of its frame: of its arms, of its unbalance, of springs in the ground."""
     lumps = len(mechanism.lumps)
     attitude, now = ideal_attitudes(t, par, mechanism)[lumps + k], motion(t, q, v, 0 * q, par, mechanism)
-    world = own[k, :3] - par.k_l * now.bodies.position[lumps + k] - par.c_l * now.velocity[lumps + k]
+    moved = now.bodies.position[lumps + k] - origins(t, par, mechanism)[lumps + k]
+    world = own[k, :3] - par.k_l * moved - par.c_l * now.velocity[lumps + k]
     if mechanism.unbalance:
         world = world + attitude @ (*par.unbalance, 0.0) * (now.spin[lumps + k] @ attitude[:, 2]) ** 2
     return attitude.T @ world

@@ -325,7 +325,7 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:
-    if mechanism.in_series:
+    if mechanism.is_shaft:
         return Reversals(0, None, None)
     torque = ideal.reversal_torque(params)
     here = np.abs(params["torque"]) < torque

@@ -260,8 +260,8 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     for note in study.notes:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
-    command = points.with_free_shaft(str(path), path.stem, study.joint, study.mechanism)
-    if note := points.note_on_shafts(study.tolerances, axial, command):
+    command = points.with_free_shaft(str(path), path.stem, study.joint)
+    if note := points.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):

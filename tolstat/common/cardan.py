@@ -1,15 +1,16 @@
-"""Mechanisms of Cardan joints: the joint, and joints in series (docs/model.md, "Parts").
+"""Mechanisms of Cardan joints: the joint, and the drive shaft of two joints (docs/model.md, "Parts").
 
 The hub carries pins 1 to 4; pin 1 turns in the hole of arm 4, pin 2 in arm 3, pin 3 in arm 1, pin 4 in arm 2. Arms 1
 and 2 belong to the input fork, 3 and 4 to the output fork. `kernel.mechanics.cardan` counts on the order of the parts.
 """
 
 from collections.abc import Collection
-from itertools import combinations
-from typing import Any
+from itertools import combinations, pairwise
 
 from tolstat.common.mechanism import (
     CLOSED_FORM,
+    GENERAL,
+    OBLIQUE,
     Bushing,
     Face,
     Hinge,
@@ -36,15 +37,18 @@ def joint(name: str, prefix: str, input_shaft: Shaft, output_shaft: Shaft) -> Me
         name,
         members=tuple(Member(member, CLOSED_FORM, part != "cross") for part, member in members.items()),
         lumps=(
-            Lump(f"{prefix}hub", members["cross"], "hub"),
-            *(Lump(f"{prefix}pin{i}", members["cross"], "pin", PIN_QUARTERS[i - 1]) for i in numbers),
-            *(Lump(f"{prefix}hole{i}", members[fork[i]], "arm", ARM_QUARTERS[i - 1]) for i in numbers),
+            Lump(f"{prefix}hub", members["cross"], f"{prefix}hub"),
+            *(Lump(f"{prefix}pin{i}", members["cross"], f"{prefix}pin", PIN_QUARTERS[i - 1]) for i in numbers),
+            *(Lump(f"{prefix}hole{i}", members[fork[i]], f"{prefix}arm", ARM_QUARTERS[i - 1]) for i in numbers),
         ),
         shafts=(input_shaft, output_shaft),
         bushings=(
-            *(Bushing(f"{prefix}cross{i}", f"{prefix}pin{i}", f"{prefix}hub", "cross", "cross") for i in numbers),
             *(
-                Bushing(f"{prefix}fork{i}", f"{prefix}hole{i}", prefix + fork[i], f"{fork[i]} fork", "fork")
+                Bushing(f"{prefix}cross{i}", f"{prefix}pin{i}", f"{prefix}hub", f"{prefix}cross", "cross")
+                for i in numbers
+            ),
+            *(
+                Bushing(f"{prefix}fork{i}", f"{prefix}hole{i}", members[fork[i]], f"{members[fork[i]]} fork", "fork")
                 for i in numbers
             ),
         ),
@@ -64,23 +68,41 @@ CARDAN = joint("cardan", "", Shaft("input", "input", driven=True), Shaft("output
 """The joint: its output shaft may turn by psi and slide by s."""
 
 
-def series(number: int) -> Mechanism:
-    """Return Cardan joints one behind the other: shafts between them, held on their axes, turn by psi1 and so on."""
-    joints = []
-    for i in range(1, number + 1):
-        before = f"psi{i - 1}" if i > 1 else ""
-        ends = (
-            Shaft(f"joint{i}.input", f"joint{i}.input", before, driven=True),
-            Shaft(f"joint{i}.output", f"joint{i}.output", f"psi{i}"),
-        )
-        joints.append(joint("", f"joint{i}.", *ends))
-    parts = ("members", "lumps", "shafts", "bushings", "hinges", "pairs", "unknowns", "cardan")
-    together: dict[str, Any] = {part: sum((getattr(one, part) for one in joints), ()) for part in parts}
-    return Mechanism("series", **together)
+def drive_shaft(name: str, *tubes: str) -> Mechanism:
+    """Return two joints and what is between them: a tube, or two that a spline joins.
+
+    Tubes are lumps in the frame of joint 1's output, and so are the arms of joint 2 on them, whose triads are oblique.
+    """
+    outer = Shaft("input", "joint1.input", driven=True), Shaft("output", "joint2.output", "psi", "s")
+    one, two = (joint("", f"joint{i}.", outer[0], outer[1]) for i in (1, 2))
+    tube, body = "joint1.output", {"joint1.input": "input", "joint1.output": tubes[0]}
+    body |= {"joint2.input": tubes[-1], "joint2.output": "output"}
+
+    def on_tube(lump: Lump) -> Lump:
+        of_tube = lump.member == "joint2.input"
+        return lump._replace(member=tube, kind="joint2.arm of tube", quarters=OBLIQUE) if of_tube else lump
+
+    return Mechanism(
+        name,
+        members=one.members + two.members,
+        lumps=(*one.lumps, *map(on_tube, two.lumps), *(Lump(part, tube, part) for part in tubes)),
+        shafts=outer,
+        bushings=(
+            *(bushing._replace(base=body.get(bushing.base, bushing.base)) for bushing in one.bushings + two.bushings),
+            *(Bushing("spline", after, before, "spline", "spline", pushed=True) for before, after in pairwise(tubes)),
+        ),
+        hinges=(*one.hinges, two.hinges[0]._replace(hole=tube, axis=GENERAL), two.hinges[1]),
+        pairs=one.pairs + two.pairs,
+        unknowns=two.unknowns,
+        cardan=one.cardan + two.cardan,
+        spline=len(tubes) > 1,
+    )
 
 
-SERIES = series(2)
-"""Two joints in series."""
+SHAFT = drive_shaft("shaft", "tube")
+"""Drive shaft of two joints and a tube."""
+SPLINED = drive_shaft("splined shaft", "tube1", "tube2")
+"""Drive shaft of two joints and two tubes, which slide in one another by a spline."""
 PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
 its first and its last shaft; unbalance of the last one, displacement of it across its axis, a spline that sticks."""
@@ -103,13 +125,13 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
         unbalance="unbalance" in parts,
-        spline="spline" in parts,
+        spline=base.spline or "spline" in parts,
     )
 
 
 MECHANISMS = {
     mechanism.name: mechanism
-    for base in (CARDAN, SERIES)
+    for base in (CARDAN, SHAFT, SPLINED)
     for n in range(len(PARTS) + 1)
     for parts in combinations(PARTS, n)
     for mechanism in [_with(base, parts)]

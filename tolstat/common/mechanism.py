@@ -110,6 +110,8 @@ class Bushing(NamedTuple):
         Bushings of one kind have the same stiffness, damping and markers.
     group : str
         Bushings of one group are shown together: ``fork``.
+    pushed : bool
+        Whether a given force along its z acts beside, which pushes the lump along z and the base against it.
     """
 
     name: str
@@ -117,6 +119,7 @@ class Bushing(NamedTuple):
     base: str
     kind: str
     group: str
+    pushed: bool = False
 
 
 class Hinge(NamedTuple):
@@ -184,7 +187,7 @@ class Mechanism(NamedTuple):
     unbalance : bool
         Whether the last shaft has an unbalance.
     spline : bool
-        Whether the last shaft has a spline that sticks.
+        Whether the last shaft has a spline that sticks, or one joins two tubes.
     waves : int
         Number of orders in the series of its members' angles.
     loaded : str
@@ -233,8 +236,8 @@ class Mechanism(NamedTuple):
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
 
     @property
-    def in_series(self) -> bool:
-        """Whether it has several Cardan joints, one behind the other."""
+    def is_shaft(self) -> bool:
+        """Whether it is a drive shaft, of several Cardan joints one behind the other."""
         return len(self.cardan) > 1
 
     @property
@@ -304,6 +307,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
         "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],
         "bushing_kind": kinds,
+        "pushed": [i for i, bushing in enumerate(mechanism.bushings) if bushing.pushed],
         "bushing_block": blocks,
         "pin": [body[pair.pin] for pair in mechanism.pairs],
         "hole": [body[pair.hole] for pair in mechanism.pairs],

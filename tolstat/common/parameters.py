@@ -46,6 +46,8 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
         Field("ahead", "rad", "angle of its input fork ahead of the output fork that drives it", shape=(joints,)),
+        Field("plane", "rad", "angle of its plane ahead of that of the joint before", shape=(joints,)),
+        Field("span", "m", "distance of its centre from that of the joint before", shape=(joints,)),
         Field("omega", "rad/s", "mean angular velocity of the input shaft"),
         Field("torque", "N*m", "mean resisting torque T"),
         Field("n_orders", "1", "number of orders", "i8"),
@@ -87,6 +89,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "marker of a bushing from the reference points of lump and base, along e, t, z of the lump",
             shape=(bushings, 2, 3),
         ),
+        Field("push", "N", "force of a bushing that is pushed, along its z on the lump"),
         Field("c_d", "N*s/m", "normal contact damping"),
         Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
         Field("delta_d", "m", "penetration over which contact damping rises"),

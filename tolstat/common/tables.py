@@ -229,16 +229,15 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
-    if mechanism.unbalance:
-        fields += [
-            Field("shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
-            Field("shaft.unbalance_angle", "rad", "deviation of its direction"),
-        ]
-    if mechanism.spline:
-        text = "axial force of the sticking spline over 2 mu T/d, from -1 to 1"
-        fields.append(Field("shaft.spline", "1", text))
-    if mechanism.friction:
-        fields.append(Field("friction.mu", "1", "deviation of the coefficient of friction"))
+    of_parts = (
+        (mechanism.is_shaft, "shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
+        (mechanism.is_shaft, "shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
+        (mechanism.unbalance, "shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
+        (mechanism.unbalance, "shaft.unbalance_angle", "rad", "deviation of its direction"),
+        (mechanism.spline, "shaft.spline", "1", "axial force of the sticking spline over 2 mu T/d, from -1 to 1"),
+        (mechanism.friction, "friction.mu", "1", "deviation of the coefficient of friction"),
+    )
+    fields += [Field(name, unit, text) for there, name, unit, text in of_parts if there]
     for prefix in prefixes(mechanism) if mechanism.faces else ():
         fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
     return tuple(fields)

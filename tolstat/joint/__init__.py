@@ -16,23 +16,24 @@ if TYPE_CHECKING:
     from tolstat.joint.perturbation import MEANS as MEANS
     from tolstat.joint.perturbation import SPLINE as SPLINE
     from tolstat.joint.perturbation import Operation as Operation
-    from tolstat.joint.perturbation import OperationInSeries as OperationInSeries
-    from tolstat.joint.perturbation import Series as Series
+    from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
     from tolstat.joint.perturbation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
     from tolstat.joint.reading import load as load
     from tolstat.joint.reading import varied as varied
+    from tolstat.joint.shaft import DriveShaft as DriveShaft
 
 _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": (
-        *("MEANS", "SPLINE", "Operation", "OperationInSeries", "Series"),
+        *("MEANS", "SPLINE", "Operation", "OperationOfShaft"),
         *("mechanism_of", "nominal_errors", "operating", "perturb"),
     ),
     "reading": ("load", "varied"),
+    "shaft": ("DriveShaft",),
 }
 
 

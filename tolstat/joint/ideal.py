@@ -54,7 +54,7 @@ def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
 
 
 def ratio_of_all(theta: ArrayLike, par: NDArray[np.void]) -> Array:
-    """Speed ratio of the last output shaft to the first input shaft, of a joint or of joints in series.
+    """Speed ratio of the last output shaft to the first input shaft, of a joint or of drive shafts.
 
     Parameters
     ----------

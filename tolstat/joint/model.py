@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, named
 from tolstat.common.errors import Fault
 from tolstat.common.loads import loads_of
 from tolstat.common.strict import Strict, refuse
@@ -43,7 +43,7 @@ def giving(pattern: str) -> str:
     """Key of the joint that gives it an error or load of this name or pattern; empty where none of `GIVEN_BY` does."""
 
     def names(parts: Collection[str]) -> set[str]:
-        every = [MECHANISMS[named(base, parts)] for base in (CARDAN, SERIES)]
+        every = [MECHANISMS[named(base, parts)] for base in (CARDAN, SHAFT)]
         return {name for one in every for name in (*loads_of(one), *(f.name for f in tables(one).error_fields))}
 
     of_parts = ((key, names([part]) - names([])) for part, key in GIVEN_BY.items())

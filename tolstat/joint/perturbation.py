@@ -13,9 +13,9 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, SERIES, named
+from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, named
 from tolstat.common.loads import split
-from tolstat.common.mechanism import Mechanism
+from tolstat.common.mechanism import OBLIQUE, Mechanism
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict
 from tolstat.common.tables import FACTORS, blank_params, tables
@@ -24,7 +24,8 @@ from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import RIGID, Arm, Bushing, Pin, Spline
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Spline
+from tolstat.joint.shaft import DriveShaft, Lumped
 
 Table = NDArray[np.void]
 
@@ -86,46 +87,33 @@ class Operation(Strict):
         return schema
 
 
-class Series(Strict):
-    """Two joints in series: the second one, and the tube between them. Both are the joint of the study."""
+class OperationOfShaft(Operation):
+    """Operating point of a drive shaft; `alpha` is that of joint 1."""
 
-    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
-    """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
-    offset: units.Angle = Field(default=0.0, examples=["5 deg"])
-    """angle by which the fork at the tube's output end is turned ahead of where, at equal misalignments, the output
-    turns evenly: ahead of the fork at its input end, less the angle between the planes of the two joints"""
-    inertia: units.Inertia = Field(examples=["0.01 kg*m^2"])
-    """moment of inertia of the tube about its axis"""
-
-    @property
-    def in_words(self) -> str:
-        """``"joint 2 of 6 deg, offset 5 deg"``."""
-        turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
-        return f"joint 2 of {math.degrees(self.alpha):.4g} deg{turned}"
-
-
-class OperationInSeries(Operation):
-    """Operating point of two joints in series; `alpha` is that of joint 1."""
-
-    series: Series
-    """joint 2 and the tube"""
+    shaft: DriveShaft
+    """joint 2 and the tubes"""
 
     @property
     def alphas(self) -> tuple[float, ...]:
         """See `Operation.alphas`."""
-        return self.alpha, self.series.alpha
+        return self.alpha, self.shaft.alpha
 
 
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
 SPLINE = "shaft.spline"
-"""Error of a joint with `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
+"""Error of what has a `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
-    """What is simulated: a joint, or joints in series, with the parts that the joint has."""
-    base = SERIES if isinstance(operation, OperationInSeries) else CARDAN
+    """What is simulated: a joint or a drive shaft, with the parts that the joint has."""
+    shaft = _shaft_of(operation)
+    base = CARDAN if shaft is None else shaft.mechanism
     return MECHANISMS[named(base, joint.parts)]
+
+
+def _shaft_of(operation: Operation) -> DriveShaft | None:
+    return operation.shaft if isinstance(operation, OperationOfShaft) else None
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -154,8 +142,7 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     """
     values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
     if spline is not None:
-        largest = 2.0 * spline.mu * np.abs(values["torque"]) / spline.diameter
-        values["axial_force"] = values["axial_force"] + errors[SPLINE] * largest
+        values["axial_force"] = values["axial_force"] + errors[SPLINE] * spline.largest_force(values["torque"])
     return values
 
 
@@ -182,15 +169,22 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """
     mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
+    shaft = _shaft_of(operation)
     for name, value in _constants(joint).items():
         params[name] = value
+    for name, of_kinds in _of_kinds(joint, shaft).items():
+        kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
+        params[name] = [of_kinds[kind] for kind in kinds]
     point = operating(operation, errors, joint.shaft.spline)
     params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
-    if isinstance(operation, OperationInSeries):
-        series = operation.series
-        params["alpha"][:, 1] = series.alpha
-        params["ahead"][:, 1] = 0.5 * np.pi + series.offset
-        params["Js"][:, 0] = series.inertia
+    lumps = mechanism.lumps
+    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
+    if shaft is not None:
+        params["plane"][:, 1], params["span"][:, 1] = shaft.plane, shaft.length
+        params["alpha"][:, 1] = shaft.alpha + errors["shaft.alpha"]
+        params["ahead"][:, 1] = 0.5 * np.pi + shaft.offset + errors["shaft.offset"]
+        triads |= _on_tube(params["ahead"][:, 1] + shaft.plane)
+        params["triad"] = np.stack(np.broadcast_arrays(*(triads[lump.name] for lump in lumps)), axis=1)
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
@@ -204,8 +198,6 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params[name] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         params["c"] *= np.sqrt(factor)[:, None, None]
-    lumps = mechanism.lumps
-    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters for lump in lumps]), strict=True))
     for i, (pin, hole, _) in enumerate(mechanism.pairs):
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
@@ -216,6 +208,8 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         for i, face in enumerate(mechanism.faces):
             play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+    if shaft is not None and shaft.spline is not None:
+        params["push"] = errors[SPLINE] * shaft.spline.largest_force(point["torque"])
     if joint.shaft.unbalance is not None:
         size = joint.shaft.unbalance.size + errors["shaft.unbalance"]
         angle = (joint.shaft.unbalance.angle or 0.0) + errors["shaft.unbalance_angle"]
@@ -229,21 +223,8 @@ def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
     contact, shaft, stations = joint.contact, joint.shaft, joint.contact.springs(joint.bearing)
     unused = (0, MAX_STATIONS - len(stations.s))
-    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
-    of_cross = _bushing_damping(joint.k_cross, joint.pin, joint.bushing)
-    of_fork = _bushing_damping(joint.k_fork, joint.arm, joint.bushing)
     return {
-        "R": R,
-        "mass": [joint.hub.mass, joint.pin.mass, joint.arm.mass],
-        "inertia": [joint.hub.inertia, joint.pin.inertia, joint.arm.inertia],
-        "at": [(0.0, 0.0, 0.0), (R, 0.0, 0.0), (R, 0.0, 0.0)],
-        "k": [joint.k_cross, joint.k_fork, joint.k_fork],
-        "c": [of_cross, of_fork, of_fork],
-        "marker": [
-            [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)],
-            [(0.0, 0.0, -l_f), (R, 0.0, -l_f)],
-            [(0.0, 0.0, l_f), (R, 0.0, l_f)],
-        ],
+        "R": joint.cross.R,
         "Js": shaft.Js,
         "face_k": joint.thrust.k if joint.thrust else 0.0,
         "face_c": joint.thrust.c if joint.thrust else 0.0,
@@ -276,8 +257,60 @@ def _constants(joint: Joint) -> dict[str, Any]:
     }
 
 
-def _bushing_damping(k: Array, body: Pin | Arm, bushing: Bushing) -> Array:
-    return material.bushing_damping(k, body.mass, np.array(body.inertia), bushing.xi)
+OF_LUMPS = ("mass", "inertia", "at")
+"""Parameters of kinds of lumps; others of `_of_kinds` are of kinds of bushings."""
+
+
+def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any]]:
+    """Parameters of lumps and bushings by kind, at factor 1 on E, in a joint or in a drive shaft."""
+    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
+    of: dict[str, dict[str, Any]] = {name: {} for name in (*OF_LUMPS, "k", "c", "marker")}
+
+    def lump(kind: str, body: Hub | Pin | Arm | Lumped, at: tuple[float, float, float]) -> None:
+        of["mass"][kind], of["inertia"][kind], of["at"][kind] = body.mass, body.inertia, at
+
+    def bushing(kind: str, k: Array, body: Pin | Arm | Lumped, markers: Sequence[tuple[float, float, float]]) -> None:
+        damping = material.bushing_damping(k, body.mass, np.array(body.inertia), joint.bushing.xi)
+        of["k"][kind], of["c"][kind], of["marker"][kind] = k, damping, markers
+
+    tubes = {} if shaft is None else shaft.tubes
+    # distance of the base's reference point from the joint's centre, along the base
+    ends = {"input": 0.0, "output": 0.0}
+    if shaft is not None:
+        at = [tube.at for tube in tubes.values()]
+        ends = {
+            "joint1.input": 0.0,
+            "joint1.output": at[0],
+            "joint2.input": at[-1] - shaft.length,
+            "joint2.output": 0.0,
+        }
+    for end, base in ends.items():
+        prefix = end.removesuffix("input").removesuffix("output")
+        side = -1.0 if end.endswith("input") else 1.0
+        lump(f"{prefix}hub", joint.hub, (0.0, 0.0, 0.0))
+        lump(f"{prefix}pin", joint.pin, (R, 0.0, 0.0))
+        lump(f"{prefix}arm", joint.arm, (R, 0.0, 0.0))
+        bushing(f"{prefix}cross", joint.k_cross, joint.pin, [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)])
+        fork = [(0.0, 0.0, side * l_f), (R, 0.0, side * l_f - base)]
+        bushing(f"{end} fork", joint.k_fork, joint.arm, fork)
+    if shaft is not None:
+        lump("joint2.arm of tube", joint.arm, (R, 0.0, shaft.length))
+        for name, tube in tubes.items():
+            lump(name, tube, (0.0, 0.0, tube.at))
+        if spline := shaft.spline:
+            k = np.array([*[spline.k_lateral] * 2, 0.0, *[spline.k_bending] * 2, spline.k_torsion])
+            places = [(0.0, 0.0, spline.at - tubes[name].at) for name in ("tube2", "tube1")]
+            bushing("spline", k, tubes["tube2"], places)
+            of["c"]["spline"][2] = spline.axial_damping
+    return of
+
+
+def _on_tube(turned: Array) -> dict[str, Array]:
+    """Triads, (n, 3, 3) each, of the arms of joint 2 in axes of the tube; `turned`: about the tube, rad, (n,)."""
+    zero, one = np.zeros_like(turned), np.ones_like(turned)
+    cosine, sine = np.cos(turned), np.sin(turned)
+    attitude = np.moveaxis(np.array([[cosine, -sine, zero], [sine, cosine, zero], [zero, zero, one]]), -1, 0)
+    return {f"joint2.hole{i}": np.einsum("nij,aj->nai", attitude, ARM_TRIADS[i - 1]) for i in (1, 2)}
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
@@ -287,15 +320,12 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     normal to e, Rodrigues' formula leaves cos|epsilon| e + sin|epsilon|/|epsilon| (epsilon x e). Angles beyond half a
     turn count as half a turn: 6.28 deg taken for 6.28 rad, nearly a whole turn, must not pass for a small tilt.
     """
-    e, t, z = triad
-    point = sum(
-        np.multiply.outer(errors[f"{feature}.offset_{name}"], axis) for name, axis in zip("etz", triad, strict=True)
-    )
+    e, t, z = (triad[..., k, :] for k in range(3))
+    point = sum(errors[f"{feature}.offset_{name}"][:, None] * axis for name, axis in zip("etz", (e, t, z), strict=True))
     about_t, about_z = errors[f"{feature}.tilt_t"], errors[f"{feature}.tilt_z"]
     angle = np.minimum(np.hypot(about_t, about_z), np.pi)
     ratio = np.sinc(angle / np.pi)
-    axis = np.multiply.outer(np.cos(angle), e)
-    axis += np.multiply.outer(ratio * about_z, t) - np.multiply.outer(ratio * about_t, z)
+    axis = np.cos(angle)[:, None] * e + (ratio * about_z)[:, None] * t - (ratio * about_t)[:, None] * z
     return np.asarray(point), axis
 
 

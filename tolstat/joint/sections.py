@@ -15,6 +15,7 @@ from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
+from tolstat.joint.material import Array
 
 Length = Annotated[units.Length, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -247,6 +248,10 @@ class Spline(Strict):
     """coefficient of friction of its flanks"""
     diameter: Length = Field(examples=["40 mm"])
     """pitch diameter d"""
+
+    def largest_force(self, torque: Array) -> Array:
+        """Axial force (N) that its friction can hold at a torque (N m): 2 mu T/d."""
+        return abs(torque) * (2.0 * self.mu / self.diameter)
 
 
 class Shaft(Strict):

@@ -121,8 +121,8 @@ def note_on_mounting(store: Reader) -> str:
     """Note where rigid shafts meet errors along them, see `points.note_on_shafts`; empty for other files."""
     names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
     joint, name = joint_of(store, 0), store.study_name
-    command = points.with_free_shaft(f"{name}.toml", name, joint, store.mechanism)
-    return points.note_on_shafts(names, mountings(store)[0], command)
+    command = points.with_free_shaft(f"{name}.toml", name, joint)
+    return points.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

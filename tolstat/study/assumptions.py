@@ -75,11 +75,14 @@ def _process(key: str) -> str:
 def given(study: Study) -> tuple[str, ...]:
     """Names of the assumptions of the joint file that the study gives: its ``[joint]`` or fit sets one of their keys.
 
-    A key that follows from one that the study sets is given, too: it no longer has the value of the joint file. In
-    series so is ``shaft.axial``, since the shafts are held.
+    A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
+    Beside a spline so is ``shaft.axial``, since a second part that slides would hold nothing.
     """
     replaced = {entry.name for entry in study.assumed}
-    of_study = {*leaves(_keys_of_study(study)), *(("shaft.axial",) if study.mechanism.in_series else ())}
+    of_study = {
+        *leaves(_keys_of_study(study)),
+        *(("shaft.axial",) if study.mechanism.spline and study.mechanism.is_shaft else ()),
+    }
     keys = derived.changed(of_study, leaves(study.joint.given("json")))
     return tuple(
         entry.name

@@ -42,8 +42,8 @@ NAMES = 2
 
 
 def _settable(mechanism: Mechanism) -> tuple[str, ...]:
-    """`SETTABLE`, and ``series`` of a study in series: a change does not make another mechanism."""
-    return (*SETTABLE, "series") if mechanism.in_series else SETTABLE
+    """`SETTABLE`, and ``shaft`` of a drive shaft: a change does not make another mechanism."""
+    return (*SETTABLE, "shaft") if mechanism.is_shaft else SETTABLE
 
 
 def with_settings(study: Study, settings: Sequence[str]) -> str:
@@ -58,7 +58,7 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
         ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
         entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
-        operating points ``"operation.start.alpha=12 deg"``; in series ``"series.alpha=8 deg"``;
+        operating points ``"operation.start.alpha=12 deg"``; of a drive shaft ``"shaft.alpha=8 deg"``;
         ``"errors.pin1.tilt_t=0.1 deg"``. Later
         ones override patterns of earlier ones.
 

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error, raise_a
 from tolstat.common.loads import load_of, loads_of, split, units_of_limits
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import SPLINE, Joint, Series, reading
+from tolstat.joint import SPLINE, DriveShaft, Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -30,7 +30,7 @@ from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "series", "solver", "errors", "limits")
+OF_CASE = ("joint", "operation", "shaft", "solver", "errors", "limits")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
@@ -146,7 +146,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "fit": fits.read,
     "joint": _joint,
     "assumed": _assumed,
-    "series": lambda file: file.model(Series, file.data["series"], "series") if "series" in file.data else None,
+    "shaft": lambda file: file.model(DriveShaft, file.data["shaft"], "shaft") if "shaft" in file.data else None,
     "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
     "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
@@ -297,7 +297,7 @@ def load(
     whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
-        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "series")}
+        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "shaft")}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
         study = Study(file.path, file.text, **parts)
         with gather(file.faults):
@@ -328,7 +328,7 @@ def load_case(path: str | Path) -> Study:
             f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"
         )
         raise input_error(file.place, "is a study, not a case of one joint", remedy)
-    _read(file, ["joint", "series"])
+    _read(file, ["joint", "shaft"])
     file.parts["points"] = ()
     with gather(file.faults):
         file.parts["points"] = (Point("", points.operation(file), 1.0),)

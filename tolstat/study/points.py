@@ -20,10 +20,10 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import SPLINE, Joint, Operation, OperationInSeries, Series, orders
+from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
-from tolstat.joint.sections import RIGID
+from tolstat.joint.sections import FREE, RIGID
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
 
@@ -58,7 +58,7 @@ class Point(NamedTuple):
         for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
             words += f", {orders.in_words(given)} of {name}" if given else ""
         words += f", {at.partner.in_words}" if at.partner else ""
-        words += f", {at.series.in_words}" if isinstance(at, OperationInSeries) else ""
+        words += f", {at.shaft.in_words}" if isinstance(at, OperationOfShaft) else ""
         return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
     @classmethod
@@ -69,9 +69,9 @@ class Point(NamedTuple):
         for key, order in ORDERS.items():
             keys[key] = tuple(order.model_construct(**wave) for wave in keys.get(key, ()))
         keys["partner"] = Partner.model_construct(**keys["partner"]) if "partner" in keys else None
-        kind: type[Operation] = OperationInSeries if "series" in keys else Operation
-        if "series" in keys:
-            keys["series"] = Series.model_construct(**keys["series"])
+        kind: type[Operation] = OperationOfShaft if "shaft" in keys else Operation
+        if "shaft" in keys:
+            keys["shaft"] = DriveShaft.of(keys["shaft"])
         return cls(name, kind.model_construct(None, **keys), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class Point(NamedTuple):
 
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
         ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
-        ``partner`` and ``series`` with their keys in SI units.
+        ``partner`` and ``shaft`` with their keys in SI units.
         """
         values = self.operation.model_dump()
         values = {key: value for key, value in values.items() if key not in (*ORDERS, "partner") or value}
@@ -139,11 +139,11 @@ def operation(file: Reading) -> Operation:
 
 
 def _of_mechanism(file: Reading, read: Operation) -> Operation:
-    """Operating point with joint 2 of ``[series]``, if the file has one."""
+    """Operating point with joint 2 of ``[shaft]``, if the file has one."""
     values = {key: getattr(read, key) for key in Operation.model_fields}
-    if file.series is None:
+    if file.shaft is None:
         return Operation.model_construct(**values)
-    return OperationInSeries.model_construct(**values, series=file.series)
+    return OperationOfShaft.model_construct(**values, shaft=file.shaft)
 
 
 def _note_shares(file: Reading, points: Sequence[Point]) -> None:
@@ -270,12 +270,8 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
         yield NO_CLOSED_FORM
     if any(setting.joint.friction.mu is not None for setting in every):
         yield "'ideal' does not hold with friction, which its closed forms leave out", remedy
-    if any(isinstance(setting.operation, OperationInSeries) for setting in every):
-        yield "'ideal' does not hold in series: its closed forms are those of one joint", remedy
-
-
-def _in_series(settings: Sequence[Setting]) -> list[Setting]:
-    return [setting for setting in settings if isinstance(setting.operation, OperationInSeries)]
+    if any(isinstance(setting.operation, OperationOfShaft) for setting in every):
+        yield "'ideal' does not hold for a drive shaft: its closed forms are those of one joint", remedy
 
 
 def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
@@ -283,8 +279,7 @@ def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[K
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
         paths += [("joint", "shaft", "spline")] * any(setting.joint.shaft.spline for setting in settings)
-        free = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
-        remedy = "remove it" if _in_series(settings) else free
+        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
 
@@ -292,7 +287,7 @@ def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[K
 def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
 
-    In series, refuse what only one joint can have. For forces see `idle_forces`.
+    Of drive shafts, refuse what only one joint can have, and what holds no tube. For forces see `idle_forces`.
 
     Parameters
     ----------
@@ -306,7 +301,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     tuple
         Key path, what was found, remedy.
     """
-    in_series = _in_series(settings)
+    of_shafts = [setting for setting in settings if isinstance(setting.operation, OperationOfShaft)]
     for key in ("speed", "torque"):
         if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
@@ -316,22 +311,29 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         if len({part in setting.joint.parts for setting in settings}) > 1:
             found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
             yield ("joint",), found, "give it to all of them, or to none"
-    of_shafts = [setting.joint.shaft.unbalance for setting in settings]
-    if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in of_shafts):
+    unbalances = [setting.joint.shaft.unbalance for setting in settings]
+    if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in unbalances):
         remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
         yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
-    for path in dict.fromkeys((*setting.path, "partner") for setting in in_series if setting.operation.partner):
-        found = "stands beside [series]: both joints are simulated, none stands for the other"
-        yield path, found, "remove it, or [series]"
-    if any(setting.joint.shaft.slides for setting in in_series):
-        found = "is not rigid: in series, tube and shafts are held on their axes, along and across"
-        yield ("joint", "shaft", "axial"), found, 'write "rigid", or remove [series]'
+    for path in dict.fromkeys((*setting.path, "partner") for setting in of_shafts if setting.operation.partner):
+        yield path, "stands beside [shaft], which simulates both joints", "remove it, or [shaft]"
+    if any(setting.joint.thrust is None for setting in of_shafts):
+        found = "missing: pins that slide freely locate no tube across its axis"
+        yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
+    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
+        yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
+    if any(setting.joint.shaft.spline for setting in of_shafts):
+        yield (
+            ("joint", "shaft", "spline"),
+            "is that of one joint",
+            "write shaft.spline, that of the tubes, or remove it",
+        )
     for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
         yield ("solver", "fidelity"), *texts
 
 
-def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -> str:
-    """Command that runs a study with an output shaft that is free along its axis; empty where it cannot be.
+def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
+    """Command that runs a study with an output shaft that is free along its axis.
 
     Parameters
     ----------
@@ -339,18 +341,14 @@ def with_free_shaft(study: str, stem: str, joint: Joint, mechanism: Mechanism) -
         Study file, and its name without ending.
     joint : Joint
         The study's joint; what a free shaft needs and it lacks is in the command, too.
-    mechanism : Mechanism
-        What is simulated: shafts of joints in series are held.
     """
-    if mechanism.in_series:
-        return ""
     needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
     lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
     settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
     return f"tolstat run {quote(study)} {settings} --out {quote(f'{stem}_free.h5')}"
 
 
-def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], command: str) -> str:
+def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], mechanism: Mechanism, command: str) -> str:
     """Say what rigid shafts do to errors along them, and the command that tries a free one.
 
     Parameters
@@ -359,22 +357,23 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], comm
         Errors and zones that scatter.
     axial : iterable of float or str
         ``shaft.axial`` of each variant.
+    mechanism : Mechanism
+        What is simulated.
     command : str
-        The command; empty if there is none.
+        The command.
 
     Returns
     -------
     str
-        Empty where a shaft may move, or no error along the shafts scatters.
+        Empty where a shaft may move or a spline gives way, or no error along the shafts scatters.
     """
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
-    if not along or any(value != RIGID for value in axial):
+    if not along or mechanism.spline or any(value != RIGID for value in axial):
         return ""
-    note = (
+    return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        "them: some loads are larger than with a spline."
+        f"them: some loads are larger than with a spline.\nWith a free output shaft: {command}"
     )
-    return f"{note}\nWith a free output shaft: {command}" if command else note
 
 
 def note_on_pins(toleranced: Iterable[str], mechanism: Mechanism) -> str:

@@ -15,14 +15,14 @@ from typing import Any
 from pydantic import BaseModel
 
 from tolstat.common import loads, strict
-from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
 from tolstat.common.channels import components, planes
 from tolstat.common.files import data_dir
 from tolstat.common.loads import units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
-from tolstat.joint import Joint, Operation, Series
+from tolstat.joint import DriveShaft, Joint, Operation
 from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone
@@ -45,8 +45,8 @@ WILD = r"[^.]*[*?\[][^.]*"
 """Half of a name with a wildcard."""
 FEATURE = rf"(?:[^.]*\.)?{WILD}|{WILD}\.[^.]*"
 """What stands before the last dot of a name, with a wildcard; a joint may stand before it."""
-JOINTS = joints(SERIES)
-WHOLE = tuple(MECHANISMS[named(base, PARTS)] for base in (CARDAN, SERIES))
+JOINTS = joints(SHAFT)
+WHOLE = tuple(MECHANISMS[named(base, PARTS)] for base in (CARDAN, SPLINED))
 """Mechanisms with all parts, which have the names of all others."""
 """What stands before the names of the features of one of several joints."""
 REQUIRED = ("joint", "operation", "sampling")
@@ -185,7 +185,7 @@ def sections() -> dict[str, Schema]:
     return {
         "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
         "operation": {"anyOf": points, "description": points[0]["description"]},
-        "series": of_model(Series),
+        "shaft": of_model(DriveShaft),
         "solver": of_model(Solver),
         "errors": _table(
             "Errors that every joint has, by name or pattern: deviations from nominal.",

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
-from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SERIES, named
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
@@ -287,10 +287,9 @@ class Reading:
         if "file" in self.text:
             self.text, self.parts["notes"] = signals.replaced(self.text, self.data, path, self.faults)
             self.data = read_toml(path, self.text)
-        allowed = list(sections)
         for key in self.data:
-            if key not in allowed:
-                self.fault(key, "unknown key", did_you_mean(key, allowed))
+            if key not in sections:
+                self.fault(key, "unknown key", did_you_mean(key, list(sections)))
 
     def __getattr__(self, name: str) -> Any:
         return self.parts.get(name)
@@ -298,8 +297,9 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint = self.parts.get("joint")
-        return MECHANISMS[named(SERIES if "series" in self.data else CARDAN, joint.parts if joint else PARTS)]
+        joint, shaft = self.parts.get("joint"), self.data.get("shaft")
+        base = CARDAN if shaft is None else SPLINED if isinstance(shaft, dict) and "spline" in shaft else SHAFT
+        return MECHANISMS[named(base, joint.parts if joint else PARTS)]
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

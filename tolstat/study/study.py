@@ -116,7 +116,7 @@ class Study:
 
     @property
     def mechanism(self) -> Mechanism:
-        """What is simulated: a Cardan joint, or joints in series."""
+        """What is simulated: a Cardan joint, or a drive shaft."""
         return mechanism_of(self.joint, self.operation)
 
     @property

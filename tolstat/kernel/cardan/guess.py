@@ -7,12 +7,12 @@ pins into contact. Across that plane, the cross tilts and moves so that the pins
 displacements that a rigid cross cannot remove, of the same size for all pins. Rotations are small. A joint behind
 another one is turned with the shaft between them.
 
-Joint k has the pairs from 4 k on, those of the output fork first, the bushings from 8 k on, and the shafts 2 k and
-2 k + 1.
+Joint k has the pairs from 4 k on, those of the output fork first, and the bushings from 8 k on.
 """
 
 import math
 
+from tolstat.kernel.mechanics.cardan import CROSS, OUTPUT
 from tolstat.kernel.mechanics.contact import locate
 from tolstat.kernel.mechanics.dynamics import set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion, to_pin
@@ -23,7 +23,7 @@ from tolstat.kernel.mechanics.vector import add, cross, dot, row, scale
 from tolstat.kernel.mechanics.work import NORMAL, RHO
 from tolstat.kernel.simd.jit import njit
 
-Z = (0.0, 0.0, 1.0)
+Z, ZERO = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 LEAST = 0.1
 """Smallest displacement of a pin in the plane of the cross, as a share of its displacement at contact."""
 
@@ -74,21 +74,42 @@ def rigid_guess(t, at_rest, par, work, q):
     """Write the guess of the unknowns at time `t` (s) to `q`; `at_rest`: zeros, (n,); `work` is scratch."""
     q[:] = 0.0
     ideal_motion(par.omega * t, par, work)
+    psi = 0.0
     for joint in range(par.cardan.shape[0]):
-        place_joint(joint, at_rest, par, work, q)
+        psi = place_joint(joint, psi, at_rest, par, work, q)
 
 
 @njit
-def place_joint(joint, at_rest, par, work, q):
-    """Write the unknowns of a joint to `q`, in which those of the joints before it stand; `at_rest`: zeros, (n,)."""
-    first, shafts, output = 4 * joint, 6 * par.lump_kind.shape[0], 2 * joint + 1
-    shift_along = 0.0
+def place_joint(joint, by_input, at_rest, par, work, q):
+    """Write the unknowns of cross and output of a joint to `q`, in which those of the joints before it stand.
+
+    Parameters
+    ----------
+    joint : int
+        Its number.
+    by_input : float
+        Rotation of its input from the ideal one, rad.
+    at_rest : ndarray, shape (dof,)
+        Zeros.
+    par, work : records of PARAM and WORK
+        The joint; scratch.
+    q : ndarray, shape (dof,)
+        Written.
+
+    Returns
+    -------
+    float
+        Rotation of its output, rad.
+    """
+    first, member = 4 * joint, par.cardan[joint]
+    share = by_input / work.frame_w[member, 2]
+    psi = share * work.frame_w[member + OUTPUT, 2]
+    if by_input != 0:
+        move(member + CROSS, ZERO, scale(share, row(work.frame_w, member + CROSS)), par, q)
+        move(member + OUTPUT, ZERO, scale(psi, Z), par, q)
     locate_all(q, at_rest, par, work)
-    if par.slide[output] >= 0 and par.slides > 0:
-        shift_along = shift_along_axis(joint, par, work)
-        q[shafts + par.slide[output]] = shift_along
-        for pin in (first, first + 1):
-            q[6 * par.hole[pin] + 2] = shift_along
+    if slides(member + OUTPUT, par):
+        move(member + OUTPUT, scale(shift_along_axis(joint, par, work), Z), ZERO, par, q)
         locate_all(q, at_rest, par, work)
     z0, z1 = middle(first, par, work), middle(first + 1, par, work)
     z2, z3 = middle(first + 2, par, work), middle(first + 3, par, work)
@@ -104,29 +125,37 @@ def place_joint(joint, at_rest, par, work, q):
     want1, r1 = travel_to_contact(first + 1, forward, across, par, work)
     turn_out = (want0 + want1) / (r0 + r1)
     shift = (r0 * turn_out - want0, want2 - r2 * turn_in, up)
-    psi = (turn_in - turn_out) / work.relative[2 * joint + 1, 0]
-    turned = (about_x, about_y, turn_in)
-    before = par.turn[2 * joint]
-    if before >= 0:
-        member = par.cardan[joint]
-        by_input = q[shafts + before] / work.frame_w[member, 2]
-        turned = add(turned, scale(by_input, row(work.frame_w, member + 1)))
-        psi += by_input * work.frame_w[member + 2, 2]
-        turn_fork(first + 2, q[shafts + before], 0.0, par, q)
-    hub = par.bushing_base[8 * joint]
-    put_body(q, hub, shift, turned)
-    for pin in range(first, first + 4):
-        at = from_triad(par.pin[pin], (par.R, 0.0, 0.0), par)
-        put_body(q, par.pin[pin], add(shift, cross(turned, at)), turned)
-    turn_fork(first, psi, shift_along, par, q)
-    q[shafts + par.turn[output]] = psi
+    turned = (turn_in - turn_out) / work.relative[2 * joint + 1, 0]
+    move(member + CROSS, shift, (about_x, about_y, turn_in), par, q)
+    move(member + OUTPUT, ZERO, scale(turned, Z), par, q)
+    return psi + turned
 
 
 @njit
-def turn_fork(pin, psi, s, par, q):
-    """Write the unknowns of a fork's arms, the holes of `pin` and the next, that is turned by `psi`, shifted by `s`."""
-    for hole in (par.hole[pin], par.hole[pin + 1]):
-        put_body(q, hole, add(from_triad(hole, (0.0, psi * par.R, 0.0), par), scale(s, Z)), scale(psi, Z))
+def slides(member, par):
+    """Whether the shaft of a member may move along its axis."""
+    for shaft in range(par.slide.shape[0]):
+        if par.frame[par.lump_kind.shape[0] + shaft] == member:
+            return par.slide[shaft] >= 0 and par.slides > 0
+    return False
+
+
+@njit
+def move(member, u, phi, par, q):
+    """Displace all bodies of a member by `u` (m) and turn them about its origin by `phi` (rad), in the unknowns `q`."""
+    lumps = par.lump_kind.shape[0]
+    for body in range(lumps):
+        if par.frame[body] == member:
+            moved = add(u, cross(phi, from_triad(body, row(par.at, par.lump_kind[body]), par)))
+            for k in range(3):
+                q[6 * body + k] += moved[k]
+                q[6 * body + 3 + k] += phi[k]
+    for shaft in range(par.turn.shape[0]):
+        if par.frame[lumps + shaft] == member:
+            if par.turn[shaft] >= 0:
+                q[6 * lumps + par.turn[shaft]] += phi[2]
+            if par.slide[shaft] >= 0:
+                q[6 * lumps + par.slide[shaft]] += u[2]
 
 
 @njit
@@ -161,10 +190,3 @@ def middle(pin, par, work):
     for j in range(par.n_stations):
         total += offset(pin, j, par, work)[1]
     return total / par.n_stations
-
-
-@njit
-def put_body(q, body, u, phi):
-    """Write displacement `u` and rotation vector `phi` of a lump to the unknowns `q`."""
-    for k in range(3):
-        q[6 * body + k], q[6 * body + 3 + k] = u[k], phi[k]

@@ -77,7 +77,8 @@ def bushing_load(i, par, work):
     for k in range(3):
         work.load[i, k] = -par.k[kind, k] * x[k] - par.c[kind, k] * dx[k]
         work.load[i, 3 + k] = -par.k[kind, 3 + k] * phi[k] - par.c[kind, 3 + k] * dphi[k]
-
+    if par.pushed.shape[0] > 0 and i == par.pushed[0]:
+        work.load[i, 2] += par.push
     f = from_triad(lump, (work.load[i, 0], work.load[i, 1], work.load[i, 2]), par)
     torque = from_triad(lump, (work.load[i, 3], work.load[i, 4], work.load[i, 5]), par)
     f, torque = from_base(base, f, par, work), from_base(base, torque, par, work)

@@ -2,7 +2,9 @@
 
 import math
 
+from tolstat.common.mechanism import GENERAL
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
+from tolstat.kernel.mechanics.vector import put
 from tolstat.kernel.simd.jit import njit
 
 INPUT, CROSS, OUTPUT = range(3)
@@ -72,6 +74,26 @@ def write_joints(theta, par, work):
             ct, st = c * co - s * so, s * co + c * so
             motion = (work.frame_w[before, 2], work.frame_dw[before, 2])
         write_joint(joint, (ct, st), motion, par, work)
+        if par.hinge_axis[2 * joint] == GENERAL:
+            write_on_shaft(joint, par, work)
+
+
+@njit
+def write_on_shaft(joint, par, work):
+    """Write how the cross of a joint lies and moves in the frame of the output of the joint before.
+
+    The frame of its own input is that frame, a distance L along z and turned about it.
+    """
+    x = 2 * joint
+    c, s, rate = work.relative[x, 0], work.relative[x, 1], work.relative[x, 2]
+    sine, cosine = sine_cosine(par.ahead[joint] + par.plane[joint])
+    axes = ((cosine, sine, 0.0 * c), (-sine * c, cosine * c, s), (sine * s, -cosine * s, c))
+    for j in range(3):
+        for k in range(3):
+            work.into_hole[x, k, j] = axes[j][k]
+    put(work.place, x, (0.0, 0.0, par.span[joint]))
+    put(work.place_v, x, (0.0, 0.0, 0.0))
+    put(work.relative_w, x, (cosine * rate, sine * rate, 0.0))
 
 
 @njit

@@ -104,12 +104,13 @@ def bearing_life(view: View) -> Answer:
         See `lives.lives_of`.
     """
     lives = rating.lives_of(view)
-    names = {rating.JOINT: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
+    names = {lives.whole: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
+    names |= {joint: f"all of {joint}" for joint in lives.joints}
     bearing = Column("bearing", lambda row: names.get(row["place"], str(row["place"])))
     reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
-    rate = lives.rate(rating.JOINT)
+    rate = lives.rate(lives.whole)
     if rate.valid.size and rate.valid[0] > 0.0:
         words = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
         parts.append(Panels([Panel("lives", "Life of the joints", words, partial(_draw, lives=lives), (6.4, 3.5))]))
@@ -188,7 +189,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     lives = rating.lives_of(view)
     row, undecided = rating.below_rows(lives)[-1], ""
     if lives.valid and lives.unrated == lives.valid:
-        nothing = "no joint" if lives.in_series else "no bearing"
+        nothing = "no joint" if lives.of_shaft else "no bearing"
         undecided = f"{nothing} has a rating: {_why_unrated(lives, 'every joint')}"
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
@@ -200,7 +201,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
 
 def _why_unrated(lives: rating.Lives, joints: str) -> str:
     each = " at each of its operating points" if len(lives.duty) > 1 else ""
-    whose = "a bearing of " if lives.in_series else ""
+    whose = "a bearing of " if lives.of_shaft else ""
     return (
         f"{whose}{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from "
         "which on the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not "
@@ -218,7 +219,7 @@ def _at_points(lives: rating.Lives) -> Iterator[str]:
         time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
         where = f"at {point}{time} " if point else ""
         swinging = "every joint swings" if number == lives.valid else f"{number} of {lives.valid} joints swing"
-        if lives.in_series:
+        if lives.of_shaft:
             swinging = f"a bearing of {swinging.removesuffix('s')}s"
         words = (
             f"{where}{swinging} by less than {_angle(lives)} to either side: the tracks of neighbouring needles do not "
@@ -268,7 +269,7 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
 
 def _draw(ax: Axes, lives: rating.Lives) -> None:
     """Draw the share of the joints with a shorter life."""
-    rate = lives.rate(rating.JOINT)
+    rate = lives.rate(lives.whole)
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
@@ -277,7 +278,7 @@ def _draw(ax: Axes, lives: rating.Lives) -> None:
     nominal = float(lives.nominal_hours[-1])
     ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]
     drawing.log_loads(ax.xaxis, 0.8 * min(ends), 1.25 * max(ends), max(ends), "h")
-    ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
+    ax.set(xlabel=f"life {lives.bearing.symbol} of the {lives.whole} [h]", ylabel="share of joints with a shorter life")
     if math.isfinite(nominal):
         style.mark(ax, nominal, 1.0, style.INK)
     if math.isfinite(lives.required):

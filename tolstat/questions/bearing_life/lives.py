@@ -13,6 +13,7 @@ from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
+from tolstat.common.mechanism import prefixes
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
@@ -21,8 +22,8 @@ from tolstat.questions.shares import inapplicable, unusable, with_ends
 from tolstat.store import Reader, recorded
 from tolstat.store.view import View
 
-JOINT = "joint"
-"""The joint: it lasts until the first of its bearings fails."""
+JOINT, SHAFT = "joint", "shaft"
+"""The joint, or the drive shaft: it lasts until the first of its bearings fails."""
 ANY = "any"
 """At least one of the bearings."""
 SHARES = (0.5, 0.9, 0.99)
@@ -51,9 +52,9 @@ class Lives:
         Pins, which bearings are named by.
     loads : ndarray, shape (n, pins)
         Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
-    hours : ndarray, shape (n, pins + 1)
-        Life of each bearing and of the joint, as in `places`, h; NaN without a result or without a rating.
-    nominal_loads, nominal_hours : ndarray, shape (pins,) and (pins + 1,)
+    hours : ndarray, shape (n, places)
+        Life of each bearing and of several together, as in `places`, h; NaN without a result or without a rating.
+    nominal_loads, nominal_hours : ndarray, shape (pins,) and (places,)
         The same of the nominal joint; NaN if there is none.
     short, fretting : dict of str to int
         Valid joints by operating point of which a bearing swings by less than ``bearing.critical_amplitude`` there, and
@@ -79,13 +80,23 @@ class Lives:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Pins, and `JOINT`."""
-        return (*self.pins, JOINT)
+        """Pins, of a drive shaft its joints, and the whole."""
+        return (*self.pins, *self.joints, self.whole)
 
     @property
-    def in_series(self) -> bool:
+    def joints(self) -> tuple[str, ...]:
+        """Joints of a drive shaft by their names; none of a joint."""
+        return tuple(name.rstrip(".") for name in prefixes(self.view.mechanism)) if self.of_shaft else ()
+
+    @property
+    def whole(self) -> str:
+        """What all bearings are of: `JOINT` or `SHAFT`."""
+        return SHAFT if self.of_shaft else JOINT
+
+    @property
+    def of_shaft(self) -> bool:
         """Whether the bearings are of several joints, which swing by different angles."""
-        return self.view.mechanism.in_series
+        return self.view.mechanism.is_shaft
 
     @property
     def valid(self) -> int:
@@ -98,7 +109,7 @@ class Lives:
         return np.nan if self.bearing.required_life is None else self.bearing.required_life / HOUR
 
     def rate(self, place: str) -> Sample:
-        """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
+        """Reciprocal of the life of one of `places`, 1/h: as with a load, higher is worse."""
         k = self.places.index(place)
         with np.errstate(divide="ignore"):
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
@@ -149,7 +160,7 @@ def lives_of(view: View) -> Lives:
         loads=load[skip:],
         hours=hours[skip:],
         nominal_loads=load[0] if has_nominal else np.full(len(pins), np.nan),
-        nominal_hours=hours[0] if has_nominal else np.full(len(pins) + 1, np.nan),
+        nominal_hours=hours[0] if has_nominal else np.full(hours.shape[1], np.nan),
         short=short,
         fretting=fretting,
         unrated=int((unrated[skip:].any(axis=1) & valid).sum()),
@@ -160,9 +171,10 @@ def lives_of(view: View) -> Lives:
 def turning_of(store: Reader) -> dict[str, FloatArray]:
     """Equivalent load of each bearing (n, pins), ``omega`` (n,) and ``alpha`` (n, joints) of the joints of a file."""
     operation = recorded.operating_points(store)
-    others = [np.full(store.n, alpha) for alpha in store.operation.alphas[1:]]
-    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
-    alpha = np.column_stack([operation["alpha"], *others])
+    loads, alpha = store.results(slice(None), ("equivalent_load",))["equivalent_load"], operation["alpha"][:, None]
+    if store.mechanism.is_shaft:
+        deviation = store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
+        alpha = np.column_stack([alpha, store.operation.alphas[1] + deviation])
     return {"equivalent_load": loads, "omega": operation["speed"], "alpha": alpha}
 
 
@@ -184,8 +196,8 @@ def rated(
     -------
     load : ndarray, shape (n, pins)
         Equivalent load over the duty cycle, N.
-    hours : ndarray, shape (n, pins + 1)
-        Life of each bearing and of the joint, h; NaN without a rating.
+    hours : ndarray, shape (n, places)
+        Life of each bearing, of each joint of a drive shaft, and of the whole, h; NaN without a rating.
     small : list of ndarray, shape (points, n, pins)
         Whether a bearing swings by less than its critical amplitude, and by less than `rating_life.FRETTING` of it.
     """
@@ -204,7 +216,8 @@ def rated(
         of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
     small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
     of_pins[small[1].all(axis=0)] = np.nan
-    return load, np.column_stack([of_pins, rating_life.system_life(of_pins)]), small
+    of_joints = np.split(of_pins, joints.shape[2], axis=1) if joints.shape[2] > 1 else []
+    return load, np.column_stack([of_pins, *map(rating_life.system_life, (*of_joints, of_pins))]), small
 
 
 def bearing_of(view: View) -> Bearing | None:

@@ -19,7 +19,7 @@ from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Row, Rows, Sentence
-from tolstat.questions.drawings import views
+from tolstat.questions.drawings import shaft, views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
 
@@ -30,9 +30,7 @@ LEGEND = (
 """Text below the drawings of the joint."""
 PLAIN = (
     "Lines go from pins and holes over their bushings to the hub or shaft that carries them; without errors, at the "
-    "mean input angle 0. The ends of shafts are sketched. Members that no hinge connects are drawn apart, in axes of "
-    "their own, since the model has no distance between them: z along the input shaft of a Cardan joint, x in the "
-    "plane of its shafts."
+    "mean input angle 0. The ends of shafts are sketched."
 )
 """Text below the plain picture of a mechanism."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
@@ -112,36 +110,20 @@ def drawings(view: View) -> Answer:
     Returns
     -------
     Answer
-        Pictures: the joint from all sides, with the places of the leading loads marked, before it a plain picture of
-        joints in series; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
+        Pictures: the joint from all sides, with the places of the leading loads marked, before it a drive shaft as a
+        whole; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
     kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
     drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
-    parts: list[Part] = [*_plain_of(view, marked), Panels([*drawn, kinds]), Sentence(LEGEND)]
+    operation = view.at(view.points[0]).store.operation
+    whole: list[Part] = []
+    if isinstance(operation, joints.OperationOfShaft):
+        whole = [Panels([shaft.picture(recorded.joint_of(view.store, 0), operation)])]
+    parts: list[Part] = [*whole, Panels([*drawn, kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
     return Answer("drawings", "The joint and its errors, drawn", parts)
-
-
-def _plain_of(view: View, marked: Collection[str]) -> list[Part]:
-    """Plain picture of what is not one Cardan joint, which draws itself, at the first operating point."""
-    mechanism, point = view.mechanism, view.points[0]
-    if len(mechanism.cardan) == 1:
-        return []
-    operation = view.at(point).store.operation
-    params = joints.perturb(recorded.joint_of(view.store, 0), operation, joints.nominal_errors(1, mechanism))
-    panels = [replace(p, title=p.title + f", at {point}" * bool(point)) for p in _plain(mechanism, params, marked)]
-    same = [[shaft.name for shaft in mechanism.shafts if shaft.turns == name] for name in mechanism.rotations]
-    bodies = "".join(f" {' and '.join(names)} are one body." for names in same if len(names) > 1)
-    return [Panels(panels), Sentence(PLAIN + bodies)]
-
-
-def _plain(mechanism: Mechanism, params: NDArray[np.void], marked: Collection[str]) -> list[Panel]:
-    from tolstat.questions.drawings import plain
-
-    row = params.view(np.recarray)[0]
-    return plain.views(mechanism, row, plain.frames(mechanism, row), marked)
 
 
 def _worst(view: View) -> list[Panel]:
@@ -182,7 +164,7 @@ def read(
     row : int, optional
         Row of the campaign whose errors are drawn; of a result file.
     alpha : str, optional
-        Misalignment in place of the source's own, ``"20 deg"``, of joints in series that of the first; a joint file has
+        Misalignment in place of the source's own, ``"20 deg"``, of drive shafts that of the first; a joint file has
         none: 15 deg by default.
 
     Returns
@@ -190,7 +172,7 @@ def read(
     joint : Joint
         The nominal joint; of a result file that of its first slot, or of the row.
     alphas : list of float
-        Its misalignment, rad, of joints in series that of each; of several operating points those of the first.
+        Its misalignment, rad, of drive shafts that of each; of several operating points those of the first.
     title : str
         A headline.
     errors : ndarray, shape (1,), dtype ERROR, or None
@@ -241,7 +223,7 @@ def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str =
     joint : Joint
         The nominal joint, such as ``study.joint``.
     alpha : float or sequence of float
-        Misalignment, rad; of joints in series that of each.
+        Misalignment, rad; of drive shafts that of each.
     title : str
         Headline; the joint's description by default.
     columns : int
@@ -275,7 +257,11 @@ def draw_mechanism(
     marked : collection of str
         Bushings, pins and shafts that stand out.
     """
-    return drawing.sheet(_plain(mechanism, params, marked), title or mechanism.name, [PLAIN])
+    from tolstat.questions.drawings import plain
+
+    row = params.view(np.recarray)[0]
+    panel = plain.views(mechanism, row, plain.frames(mechanism, row), marked)
+    return drawing.sheet([panel], title or mechanism.name, [PLAIN])
 
 
 def draw_errors(joint: joints.Joint) -> Figure:
@@ -326,7 +312,7 @@ def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
         ("arm.d", arm.d, "diameter of a round arm"),
     ]
     shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
-    for key, alpha in zip(("operation.alpha", "series.alpha"), alphas, strict=False):
+    for key, alpha in zip(("operation.alpha", "shaft.alpha"), alphas, strict=False):
         shown.append((key, f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
     if joint.thrust is not None:
         shown.append(

@@ -5,7 +5,7 @@ Everything is drawn at the mean input angle 0, without errors.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -45,7 +45,7 @@ class Frame(NamedTuple):
 
 
 Group = Mapping[str, Frame]
-"""Frames of members that hinges connect, by name, in common axes."""
+"""Frames of the members by name, in common axes."""
 
 
 class Part(NamedTuple):
@@ -72,34 +72,27 @@ class Part(NamedTuple):
         return place
 
 
-def frames(mechanism: Mechanism, row: Any) -> list[Group]:
-    """Frames of the members by their ideal motion, at the mean input angle 0; `row`: record of PARAM.
-
-    Members that no hinge connects are in different groups, each in axes of its own: the model has no distance between.
-    """
-    work, groups = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0], list[Group]()
+def frames(mechanism: Mechanism, row: Any) -> Group:
+    """Frames of the members by their ideal motion, at the mean input angle 0; `row`: record of PARAM."""
+    work = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0]
     ideal_motion(0.0, row, work)
     if mechanism.placed:
-        return [{one.name: Frame(work.origin[i], work.attitude[i]) for i, one in enumerate(mechanism.members)}]
-    for i, first in enumerate(mechanism.members):
-        if any(first.name in group for group in groups):
-            continue
-        c, s = work.turned[i]
-        found = {first.name: np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])}
-        for _ in mechanism.hinges:  # each pass reaches another member, until all are reached
-            for k, (_, pin, hole, _) in enumerate(mechanism.hinges):
-                relative = np.transpose([to_hole(k, tuple(axis), row, work) for axis in np.eye(3)])
-                if hole in found:
-                    found.setdefault(pin, found[hole] @ relative)
-                elif pin in found:
-                    found[hole] = found[pin] @ relative.T
-        # the axis of a hinge goes through the origins of both members
-        groups.append({name: Frame(np.zeros(3), attitude) for name, attitude in found.items()})
-    return groups
+        return {one.name: Frame(work.origin[i], work.attitude[i]) for i, one in enumerate(mechanism.members)}
+    c, s = work.turned[0]
+    found = {mechanism.members[0].name: np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])}
+    for _ in mechanism.hinges:  # each pass reaches another member, until all are reached
+        for k, (_, pin, hole, _) in enumerate(mechanism.hinges):
+            relative = np.transpose([to_hole(k, tuple(axis), row, work) for axis in np.eye(3)])
+            if hole in found:
+                found.setdefault(pin, found[hole] @ relative)
+            elif pin in found:
+                found[hole] = found[pin] @ relative.T
+    # the axis of a hinge goes through the origins of both members
+    return {name: Frame(np.zeros(3), attitude) for name, attitude in found.items()}
 
 
-def views(mechanism: Mechanism, row: Any, groups: Sequence[Group], marked: Collection[str] = ()) -> list[Panel]:
-    """Three views of each group of members, all to one scale; bushings, pins and shafts in `marked` stand out.
+def views(mechanism: Mechanism, row: Any, group: Group, marked: Collection[str] = ()) -> Panel:
+    """Three views, all to one scale; bushings, pins and shafts in `marked` stand out.
 
     Parameters
     ----------
@@ -107,31 +100,27 @@ def views(mechanism: Mechanism, row: Any, groups: Sequence[Group], marked: Colle
         The mechanism.
     row : record of PARAM
         Its parameters.
-    groups : sequence of mapping
+    group : mapping
         Frames of its members, see `frames`.
     marked : collection of str
-        Names such as ``"joint1.cross1"``, ``"pin3"``, ``"output"``.
+        Names such as ``"cross1"``, ``"pin3"``, ``"output"``.
     """
-    panels, drawn = [], [_parts(mechanism, row, group) for group in groups]
-    spans = [np.ptp(np.concatenate([part.points for part in parts.values()]), axis=0) for parts in drawn]
-    size = np.max(spans, axis=0) + 0.5 * np.max(spans)
+    parts = _parts(mechanism, row, group)
+    span = np.ptp(np.concatenate([part.points for part in parts.values()]), axis=0)
+    size = span + 0.5 * np.max(span)
     scale = (WIDTH - 2.0 * LEFT - 0.2) / (size[2] + size[0])
-    for group, parts in zip(groups, drawn, strict=True):
-        heads = {name.rpartition(".")[0] for name in group}
-        before = heads.pop() if len(heads) == 1 else ""
-        title = f"{before or 'The mechanism'} in three views"
-        words = ", ".join(f"{pair.pin} in {pair.hole}" for pair in mechanism.pairs if pair.pin in parts)
-        there = ", ".join(sorted(parts.keys() & set(marked)))
-        words = f"{title} at the mean input angle 0: {words}.{f' Marked: {there}.' if there else ''}"
-        legend = 0.24 * -(-(len(group) + 2) // 3)
-        height = scale * (size[0] + size[1]) + 2.0 * (BELOW + ABOVE) + legend
-        draw = partial(_draw, parts=parts, size=size, scale=scale, height=height, marked=marked, before=f"{before}.")
-        panels.append(Panel(f"plain-{before or 'all'}", title, words, draw, (WIDTH, height), bare=True))
-    return panels
+    title = "The mechanism in three views"
+    pairs = ", ".join(f"{pair.pin} in {pair.hole}" for pair in mechanism.pairs)
+    there = ", ".join(sorted(parts.keys() & set(marked)))
+    words = f"{title} at the mean input angle 0: {pairs}.{f' Marked: {there}.' if there else ''}"
+    legend = 0.24 * -(-(len(group) + 2) // 3)
+    height = scale * (size[0] + size[1]) + 2.0 * (BELOW + ABOVE) + legend
+    draw = partial(_draw, parts=parts, size=size, scale=scale, height=height, marked=marked)
+    return Panel("plain", title, words, draw, (WIDTH, height), bare=True)
 
 
 def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
-    """Pins, bushings and shafts of a group by name."""
+    """Pins, bushings and shafts by name."""
     member = {lump.name: lump.member for lump in mechanism.lumps}
     member |= {shaft.name: shaft.member for shaft in mechanism.shafts}
     at = {body: np.zeros(3) for body in member}
@@ -154,7 +143,6 @@ def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
     return {
         name: Part(member[body], 1e3 * (group[member[body]].origin + points @ group[member[body]].attitude.T), look)
         for name, body, points, look in drawn
-        if member[body] in group
     }
 
 
@@ -176,13 +164,13 @@ def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: f
     ax.legend(entries.values(), entries, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
 
 
-def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str], before: str) -> None:
+def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str]) -> None:
     """Draw the parts in one view, with the names of pins and of what is marked."""
     axes, members, names = list(VIEWS[title]), list[str](), dict[tuple[float, ...], list[str]]()
     reach = 0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())
     for name, part in parts.items():
         members += [part.member] * (part.member not in members)
-        line, sign = LINES[members.index(part.member) % 4] | {"label": part.member.removeprefix(before)}, part.look
+        line, sign = LINES[members.index(part.member) % 4] | {"label": part.member}, part.look
         if name in marked:
             line, sign = line | {"color": MARKED, "label": ""}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
         if len(part.points) > 1:
@@ -199,6 +187,6 @@ def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str
         outside, away = (x, max(heights) if up else min(heights)), 11.0 if up else -11.0
         for look, some in ((NAME, set(together) - set(marked)), (NAME | STRONG, set(together) & set(marked))):
             if some:
-                words = ", ".join(sorted(name.removeprefix(before) for name in some))
+                words = ", ".join(sorted(some))
                 view.annotate(words, outside, (0.0, away), **look)
                 away *= 2.0

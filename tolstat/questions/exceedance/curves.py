@@ -115,7 +115,7 @@ def _draw(ax: Axes, view: View, loads: Mapping[int, Sample], others: Sequence[Sa
 
 
 def _numbers(view: View, names: Sequence[str]) -> str:
-    """Numbers of the bushings of loads, of joints in series by joint: ``1, 2``, ``joint2: 1, 2``."""
+    """Numbers of the bushings of loads, of drive shafts by joint: ``1, 2``, ``joint2: 1, 2``."""
     numbers: dict[str, list[str]] = {}
     for name in names:
         place = load_of(name, view.mechanism).place

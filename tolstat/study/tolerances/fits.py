@@ -138,7 +138,7 @@ class Fit(NamedTuple):
 
 
 def read(file: Reading) -> Fit | None:
-    """Read the fit of ``[tolerances]``, of all joints in series; None where the table has none.
+    """Read the fit of ``[tolerances]``, of all drive shafts; None where the table has none.
 
     A fit with faults is replaced by another one, so that other faults of the file are those of the file: without
     diameters those of the joint, correlations of diameters and bonuses would seem to lack them.

@@ -1,4 +1,4 @@
-"""Studies of two joints in series: names begin with the joint, and what only one joint can have is refused."""
+"""Studies of drive shafts: names begin with the joint, and what only one joint can have is refused."""
 
 from __future__ import annotations
 
@@ -13,23 +13,31 @@ import tolstat
 from tests.support.environment import ROOT
 from tolstat import sampling, study
 from tolstat.campaign import remedy, run
-from tolstat.common.cardan import CARDAN, SERIES
+from tolstat.common.cardan import MECHANISMS
 from tolstat.common.errors import InputError
-from tolstat.joint import OperationInSeries, perturb
+from tolstat.joint import OperationOfShaft, perturb
 from tolstat.solver import fidelity
 from tolstat.study import assumptions, changes, points, schema
 
-HEAD = """
+FACES = 'thrust = { end_play = "0.05 mm", k = "1e8 N/m" }\n'
+FREE = 'shaft = { axial = "free", mass = "5 kg", axial_damping = "2e4 N*s/m" }\n'
+TUBE = 'tube = { diameter = "76 mm", wall = "2.5 mm" }'
+SPLINE = '[shaft.spline]\nat = "0.6 m"\nmu = 0.1\ndiameter = "40 mm"\n'
+JOINT = """
 [joint]
 base = "cirelli2021"
 [operation]
 alpha = "8 deg"
 speed = "1500 rpm"
 torque = "100 N*m"
-[series]
+""".replace("[operation]", f"{FACES}[operation]")
+SHAFT = f"""[shaft]
 alpha = "6 deg"
-inertia = "0.01 kg*m^2"
+arrangement = "Z"
+length = "1.2 m"
+{TUBE}
 """
+HEAD = JOINT + SHAFT
 SCATTER = '[tolerances]\n"joint*.pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "uniform" }\n'
 RANDOM = "[sampling]\nn = 60\n"
 WHOLE = HEAD + SCATTER + RANDOM
@@ -58,12 +66,12 @@ def refused(text: str) -> list[str]:
 
 def test_the_table_makes_a_study_of_two_joints() -> None:
     read = load(WHOLE)
-    assert read.mechanism == SERIES
+    assert read.mechanism == MECHANISMS["shaft+thrust"]
     assert read.operation.alphas == pytest.approx(np.radians([8, 6]))
-    assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, joint 2 of 6 deg"
+    assert read.points[0].in_words == "8 deg, 1500 rpm, 100 N m, Z arrangement, joint 2 of 6 deg"
     drawn = perturb(read.joint, read.operation, sampling.draw(read))
     assert (drawn["pin_point"][1:] != 0.0).any(axis=2).all()
-    assert isinstance(load(CASES).operations[0], OperationInSeries)
+    assert isinstance(load(CASES).operations[0], OperationOfShaft)
     assert points.Point.of("", read.points[0].values()) == read.points[0]
 
 
@@ -97,12 +105,12 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
     [
         (
             HEAD.replace('alpha = "6 deg"', 'alhpa = "6 deg"') + SCATTER + RANDOM,
-            ["series.alpha: missing key | add series.alpha, for example alpha = \"6 deg\"",
-             "series.alhpa: unknown key | did you mean 'alpha'?"],
+            ["shaft.alpha: missing key | add shaft.alpha, for example alpha = \"6 deg\"",
+             "shaft.alhpa: unknown key | did you mean 'alpha'?"],
         ),
         (
             HEAD.replace('"6 deg"', '"90 deg"') + SCATTER + RANDOM,
-            ["series.alpha: a Cardan joint cannot turn at 90 deg | give less than 90 deg"],
+            ["shaft.alpha: a Cardan joint cannot turn at 90 deg | give less than 90 deg"],
         ),
         (
             toleranced(f"pin1.offset_t = {ENTRY}"),
@@ -153,25 +161,64 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
             ["output.results[0]: 'cross*.F_max' selects nothing | did you mean '*.cross*.F_max'?"],
         ),
         (
-            WHOLE.replace("[series]", f"{PARTNER}\n[series]"),
-            ["operation.partner: stands beside [series]: both joints are simulated, none stands for the other | "
-             "remove it, or [series]"],
+            WHOLE.replace("[shaft]", f"{PARTNER}\n[shaft]"),
+            ["operation.partner: stands beside [shaft], which simulates both joints | remove it, or [shaft]"],
         ),
         (
             CASES + f'[[variant]]\nname = "x"\noperation.{PARTNER}\n',
-            ["variant.partner: stands beside [series]: both joints are simulated, none stands for the other | "
-             "remove it, or [series]"],
+            ["variant.partner: stands beside [shaft], which simulates both joints | remove it, or [shaft]"],
         ),
         (
-            WHOLE.replace("[operation]", 'shaft.axial = "free"\n[operation]') + '[solver]\nfidelity = "ideal"\n',
-            ["joint.shaft.axial: is not rigid: in series, tube and shafts are held on their axes, along and across | "
-             'write "rigid", or remove [series]',
-             "solver.fidelity: 'ideal' does not hold in series: its closed forms are those of one joint | "
+            WHOLE.replace("[operation]", f"{FREE}[operation]") + SPLINE,
+            ['joint.shaft.axial: is free beside a spline: nothing holds the shaft | write axial = "rigid"'],
+        ),
+        (
+            WHOLE + '[solver]\nfidelity = "ideal"\n',
+            ["solver.fidelity: 'ideal' does not hold for a drive shaft: its closed forms are those of one joint | "
              'write "quasistatic" or "dynamic"'],
         ),
         (
-            WHOLE.replace("[series]", 'axial_force = "20 N"\n[series]'),
-            ["operation.axial_force: has no effect: the output shaft is rigid along its axis | remove it"],
+            WHOLE.replace(FACES, ""),
+            ["joint.thrust: missing: pins that slide freely locate no tube across its axis | "
+             'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'],
+        ),
+        (
+            WHOLE.replace(TUBE, 'tube = { diameter = "76 mm" }'),
+            ["shaft.tube: has diameter without wall | add wall"],
+        ),
+        (
+            WHOLE.replace(TUBE, "tube = {}"),
+            ['shaft.tube: has neither a section nor a mass | give diameter = "76 mm" and wall = "2.5 mm", of yours'],
+        ),
+        (
+            WHOLE.replace(TUBE, TUBE.replace(" }", ', mass = "5 kg" }')),
+            ["shaft.tube: has diameter and wall beside mass | remove diameter and wall, or mass"],
+        ),
+        (
+            WHOLE.replace(TUBE, 'tube = { diameter = "76 mm", wall = "40 mm" }'),
+            ["shaft.tube: its wall is thicker than half of its diameter | check wall and diameter"],
+        ),
+        (
+            WHOLE + SPLINE.replace("0.6 m", "1.3 m"),
+            ["shaft: spline.at = 1.3 m is not between the joints | give less than length"],
+        ),
+        (
+            WHOLE + SPLINE.replace('diameter = "40 mm"', ""),
+            ['shaft.spline.diameter: missing key | add shaft.spline.diameter, for example diameter = "40 mm"'],
+        ),
+        (
+            WHOLE.replace(TUBE, TUBE + "\ntube2" + TUBE[4:]),
+            ["shaft: has tube2 without a spline | remove tube2, or add [shaft.spline]"],
+        ),
+        (
+            WHOLE.replace('"Z"', '"X"'),
+            ["shaft.arrangement: 'X' is neither a word of this key nor a number with a unit | "
+             'write "Z", "W" or a quantity such as "0.5 deg"'],
+        ),
+        (
+            WHOLE.replace("[shaft]", 'axial_force = "20 N"\n[shaft]'),
+            ["operation.axial_force: has no effect: the output shaft is rigid along its axis | "
+             'write shaft.axial = "free" or a stiffness under [joint], or remove it'],
         ),
     ],
 )  # fmt: skip
@@ -180,20 +227,22 @@ def test_what_two_joints_cannot_have_is_refused(text: str, faults: list[str]) ->
 
 
 def test_names_of_a_joint_are_refused_where_there_is_one() -> None:
-    text = WHOLE.replace('[series]\nalpha = "6 deg"\ninertia = "0.01 kg*m^2"\n', "").replace("joint*.", "")
-    assert load(text).mechanism == CARDAN
+    text = WHOLE.replace(SHAFT, "").replace("joint*.", "")
+    assert load(text).mechanism == MECHANISMS["cardan+thrust"]
     text += '[limits]\n"joint1.cross1.F" = "900 N"\n'
     assert refused(text) == ["limits.joint1.cross1.F: selects nothing | did you mean 'cross1.F'?"]
 
 
-def test_shafts_are_not_freed() -> None:
-    """Their mounting is no assumption, and no command frees them."""
-    read = load(toleranced(f'"joint*.pin*.offset_z" = {ENTRY}'))
-    assert "mounting" in assumptions.given(read)
-    assert "mounting" not in [assumption.name for assumption in assumptions.assumptions(read)]
-    command = points.with_free_shaft("x.toml", "x", read.joint, read.mechanism)
-    note = points.note_on_shafts(read.tolerances, ["rigid"], command)
-    assert note.endswith("some loads are larger than with a spline.")
+def test_shafts_with_a_spline_are_not_freed() -> None:
+    """Their mounting is no assumption, and no note tells to free them; without a spline it does."""
+    along = toleranced(f'"joint*.pin*.offset_z" = {ENTRY}')
+    for text, splined in ((along, False), (along + SPLINE, True)):
+        read = load(text)
+        assert ("mounting" in assumptions.given(read)) == splined
+        assert ("mounting" not in [assumption.name for assumption in assumptions.assumptions(read)]) == splined
+        note = points.note_on_shafts(read.tolerances, ["rigid"], read.mechanism, "tolstat run x.toml")
+        assert note.endswith("" if splined else "With a free output shaft: tolstat run x.toml")
+        assert bool(note) != splined
 
 
 def test_the_second_joint_may_be_too_fast() -> None:
@@ -205,11 +254,11 @@ def test_the_second_joint_may_be_too_fast() -> None:
 
 def test_keys_of_the_second_joint_are_changed() -> None:
     read = load(WHOLE)
-    changed = changes.read(read, changes.with_settings(read, ["series.alpha=8 deg"]))
+    changed = changes.read(read, changes.with_settings(read, ["shaft.alpha=8 deg"]))
     assert changed.operation.alphas == pytest.approx(np.radians([8, 8]))
     one = study.load(ROOT / "studies" / "iso2768_f.toml")
-    with pytest.raises(InputError, match="is in section 'series', which changes no joint"):
-        changes.with_settings(one, ["series.alpha=8 deg"])
+    with pytest.raises(InputError, match="is in section 'shaft', which changes no joint"):
+        changes.with_settings(one, ["shaft.alpha=8 deg"])
 
 
 def test_editors_know_both_joints() -> None:
@@ -220,7 +269,7 @@ def test_editors_know_both_joints() -> None:
     limited = WHOLE + '[limits]\n"joint*.cross*.F" = "1 kN"\njoint2.fork1.T = "3 N*m"\n"joint1.cross1.F at a" = "9 N"\n'
     for text in (WHOLE, CASES, dotted, limited):
         assert list(known.iter_errors(tomllib.loads(text))) == []
-    for text in (WHOLE.replace("inertia", "inertai"), WHOLE.replace("joint*.pin*.offset_t", "joint1.pin1.ofset_t")):
+    for text in (WHOLE.replace("length", "lenght"), WHOLE.replace("joint*.pin*.offset_t", "joint1.pin1.ofset_t")):
         assert not known.is_valid(tomllib.loads(text))
 
 
@@ -237,19 +286,19 @@ def test_editors_and_reader_agree_on_keys_of_a_joint_that_are_swept(key: str, ac
         assert refused(text) == ["sweep.bushing.cross: selects nothing | allowed here: k_x, k_y, k_z, k_bx, k_by, k_tz"]
 
 
-def test_joints_in_series_have_no_closed_form(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drive_shafts_have_no_closed_form(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pilot of ``auto`` leaves it out, and a retry with it is refused."""
     closed_form: list[bool] = []
     monkeypatch.setattr(fidelity, "choose", lambda *args, **given: closed_form.append(args[6]) or {})
-    for text in (WHOLE, toleranced(f'"pin1.offset_t" = {ENTRY}').replace(HEAD, HEAD.partition("[series]")[0])):
+    for text in (WHOLE, toleranced(f'"pin1.offset_t" = {ENTRY}').replace(HEAD, JOINT)):
         run.choose_fidelity(load(text + '[solver]\nfidelity = "auto"\n'))
     assert closed_form == [False, True]
-    with pytest.raises(InputError, match=r"--set: solver\.fidelity: 'ideal' does not hold in series"):
+    with pytest.raises(InputError, match=r"--set: solver\.fidelity: 'ideal' does not hold for a drive shaft"):
         remedy.parse_retry("newton_failed", ["solver.fidelity=ideal"], load(WHOLE))
 
 
 @pytest.mark.slow
-def test_psi_of_a_case_is_that_of_the_whole_series(tmp_path: Path) -> None:
+def test_psi_of_a_case_is_that_of_the_whole_shaft(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(HEAD + '[errors]\njoint2.pin1.tilt_z = "0.2 deg"\n', encoding="utf-8")
     result = tolstat.simulate_case(study.load_case(path))

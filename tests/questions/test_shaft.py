@@ -1,0 +1,138 @@
+"""Drive shafts: what differs from one joint in the questions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.environment import ROOT
+from tests.support.views import FakeStore
+from tolstat import joint, study
+from tolstat.campaign.plan import Reversals, _reversals
+from tolstat.common.columns import result_columns
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status, tables, without_results
+from tolstat.joint import nominal_errors, perturb
+from tolstat.questions.bearing_life import answer as bearing_life
+from tolstat.questions.bearing_life.lives import lives_of
+from tolstat.questions.drawings import answer as drawings
+from tolstat.questions.drawings import shaft as picture
+from tolstat.questions.exceedance import curves
+from tolstat.solver import stationary
+from tolstat.store.view import View
+from tolstat.study import changes
+from tolstat.study.assumptions import assumptions
+from tolstat.study.points import Point
+
+WEIBULL = 9 / 8
+BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "100 h"}
+
+
+@pytest.fixture(scope="module")
+def of_study():
+    return study.load(ROOT / "studies" / "shaft.toml")
+
+
+@pytest.fixture
+def view(of_study):
+    """Make a view of joints whose bearings carry 600 N each; `angles` are the misalignments, deg."""
+
+    def make(angles=(15.0, 30.0), n=40):
+        mechanism = of_study.mechanism
+        results = without_results(n, Status.OK, mechanism)
+        rise = np.random.default_rng(1).gamma(3.0, 0.1, n)
+        for name in (name for name in results.dtype.names if name.endswith("_max")):
+            results[name] = (500.0 * (1.0 + rise)).reshape(-1, *(1 for _ in results[name].shape[1:]))
+        results["settled"], results["equivalent_load"], results["mode_share"] = 1, 600.0, 0.25
+        stationary.fill_intervals(results, mechanism)
+        held = joint.load("cirelli2021", {"bearing": BEARING}, "x.toml").given("json")
+        errors = np.repeat(nominal_errors(1, mechanism), n)
+        store = FakeStore("random", of_study.limits, errors, results, columns=result_columns(mechanism), joint=held)
+        first, second = np.radians(angles)
+        shaft = of_study.operation.shaft.model_copy(update={"alpha": second})
+        operation = of_study.operation.model_copy(update={"alpha": first, "shaft": shaft})
+        store.mechanism, store.points = mechanism, {"": Point("", operation, 1.0)}
+        return View(store)
+
+    return make
+
+
+def test_each_bearing_swings_by_the_misalignment_of_its_joint(view):
+    """Twice the angle is half the life; joints and shaft last until the first of their bearings fails."""
+    lives = lives_of(view())
+    hours = lives.hours
+    assert lives.places[8:] == ("joint1", "joint2", "shaft")
+    np.testing.assert_allclose(hours[:, :4], 2.0 * hours[:, 4:8], rtol=1e-12)
+    for place, bearings in ((8, slice(0, 4)), (9, slice(4, 8)), (10, slice(0, 8))):
+        together = (hours[:, bearings] ** -WEIBULL).sum(axis=1) ** (-1.0 / WEIBULL)
+        np.testing.assert_allclose(hours[:, place], together, rtol=1e-12)
+
+
+def test_a_bearing_swings_by_the_misalignment_of_its_own_shaft(view):
+    """The deviation of joint 2's misalignment counts: half the angle is twice the life."""
+    plain, straighter = view(), view()
+    straighter.store._errors["shaft.alpha"] = np.radians(-15.0)
+    np.testing.assert_allclose(lives_of(straighter).hours[:, 4:8], 2.0 * lives_of(plain).hours[:, 4:8], rtol=1e-12)
+    np.testing.assert_allclose(lives_of(straighter).hours[:, :4], lives_of(plain).hours[:, :4], rtol=1e-12)
+
+
+def test_a_shaft_has_no_rating_where_one_of_its_bearings_frets(view):
+    lives = lives_of(view((15.0, 2.0)))
+    rated = lives.hours[:, [0, 1, 2, 3, lives.places.index("joint1")]]
+    assert np.isfinite(rated).all()
+    assert np.isnan(lives.hours).sum() == lives.hours.size - rated.size
+    assert lives.unrated == 39
+    (verdict,) = bearing_life.life_verdicts(view((15.0, 2.0)), np.nan)
+    assert "a bearing of every joint swings by less than" in verdict.words
+
+
+def test_no_reversals_are_counted(of_study):
+    params = perturb(of_study.joint, of_study.operation, nominal_errors(3, of_study.mechanism))
+    params["torque"] = 1e-6
+    assert _reversals(params, np.zeros(3, tables(of_study.mechanism).RESULT), of_study.mechanism) == Reversals(
+        0, None, None
+    )
+
+
+def test_limits_of_the_picture_name_the_joint(view):
+    axes = curves.sheet(view(), ()).axes
+    labels = axes[3].get_legend_handles_labels()[1]
+    assert "limit 275 N m (joint2: 1, 2, 3, 4)" in labels  # the loads are all above it
+    assert "joint1.fork4.T" in labels
+
+
+def test_a_change_may_set_joint_2(of_study):
+    text = changes.with_settings(of_study, ["shaft.alpha=8 deg"])
+    assert changes.read(of_study, text).operation.alphas == pytest.approx(np.radians([8.0, 8.0]))
+    assert changes.words(of_study, text) == "changed: shaft.alpha 6 deg → 8 deg"
+    alone = study.load(ROOT / "studies" / "rigid_shafts.toml")
+    with pytest.raises(InputError, match="is in section 'shaft', which changes no joint"):
+        changes.with_settings(alone, ["shaft.alpha=8 deg"])
+
+
+def test_the_mounting_of_shafts_is_not_assumed(of_study):
+    assert "mounting" in {each.name for each in assumptions(study.load(ROOT / "studies" / "rigid_shafts.toml"))}
+    assert "mounting" not in {each.name for each in assumptions(of_study)}
+
+
+def test_the_page_has_a_picture_of_the_shaft_before_those_of_its_joints(view):
+    whole, drawn, *_ = drawings.drawings(view()).parts
+    assert [panel.key for panel in whole.panels] == ["drive-shaft"]
+    assert "joint 1 of 15 deg, Z arrangement, joint 2 of 30 deg" in whole.panels[0].description
+    assert [panel.key for panel in drawn.panels[:2]] == ["joint-front-joint1", "joint-side-joint1"]
+
+
+@pytest.mark.parametrize(
+    ("arrangement", "end"),
+    [
+        ("Z", (np.sin(np.radians(2)), 0.0, np.cos(np.radians(2)))),  # 8 deg up, 6 deg down again
+        ("W", (np.sin(np.radians(14)), 0.0, np.cos(np.radians(14)))),
+    ],
+)
+def test_shafts_are_drawn_as_they_are_arranged(of_study, arrangement, end):
+    shaft = of_study.operation.shaft.model_copy(update={"arrangement": arrangement})
+    ends, bearings = picture.points_of(of_study.joint, of_study.operation.model_copy(update={"shaft": shaft}))
+    first, second = np.radians(8), 1e3 * shaft.length
+    np.testing.assert_allclose(ends[2], (second * np.sin(first), 0.0, second * np.cos(first)), atol=1e-9)
+    np.testing.assert_allclose(ends[3] - ends[2], np.linalg.norm(ends[3] - ends[2]) * np.array(end), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(bearings[:2], axis=1), (70.0, 190.0))

@@ -1,0 +1,92 @@
+"""Drive shafts of two joints: reference shafts, statics of a shaft that turns slowly (docs/model.md, "Drive shaft")."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.conftest import REFERENCE
+from tests.support.held import RPM, drive_shaft, held
+from tests.support.statics import on_shafts
+from tolstat.common.tables import SIMULATED, Options
+from tolstat.solver.simulation import simulate_rows
+
+pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
+SECTIONS = {
+    "thrust": {"end_play": "0.05 mm", "k": "1e8 N/m"},
+    "friction": {"mu": 0.05, "radius": "19 mm"},
+    "shaft": {"Js": "0.01 kg*m^2"},
+}
+EIGHT, SIX = np.radians([8.0, 6.0])
+SHAFTS = {
+    "shaft_Z": drive_shaft(EIGHT, "Z"),
+    "shaft_W": drive_shaft(EIGHT, "W"),
+    "shaft_Z_force": drive_shaft(SIX, "Z", spline={"at": "0.6 m", "mu": 0.08, "diameter": "40 mm"}),
+}
+"""The reference's spline pushes the last of them apart with 400 N: 2 mu T/d."""
+
+
+@cache
+def simulated(name: str):
+    """Result, histories and mechanism of a reference shaft in 720 steps."""
+    errors = {"shaft.spline": 1.0} if name == "shaft_Z_force" else {}
+    rows, mechanism = held(errors, alpha=EIGHT, speed=500 * RPM, drive_shaft=SHAFTS[name], **SECTIONS)
+    options = Options(steps_per_rev=720, max_refinements=0)
+    found = simulate_rows(rows, options, "full", mechanism=mechanism)
+    assert found.results["status"][0] in SIMULATED
+    return found.results[0], {key: values[0] for key, values in found.histories.items()}, mechanism
+
+
+def order(n: int, values: np.ndarray) -> np.ndarray:
+    """Complex amplitude of an order of loads over a revolution, (revolution, ...)."""
+    turned = np.exp(-2j * np.pi * n * np.arange(len(values)) / len(values))
+    return np.tensordot(turned, values, 1) / len(values)
+
+
+@pytest.mark.parametrize("name", SHAFTS)
+def test_means_and_second_orders_of_loads_are_those_of_the_reference(name: str) -> None:
+    """Within 1e-3 of the largest of a kind; crosses that strike their faces ring, and no two revolutions are alike."""
+    with np.load(REFERENCE / "shafts.npz") as file:
+        parts, largest = file["parts"].tolist(), file[f"{name}__largest"]
+        orders = {n: file[f"{name}__order{n}"] for n in (0, 2)}
+    _, histories, mechanism = simulated(name)
+    rows = [parts.index(bushing.name) for bushing in mechanism.bushings]
+    for n, expected in orders.items():
+        off = np.abs(order(n, histories["loads"]) - expected[rows])
+        assert off[:, :3].max() < 1e-3 * largest[0], n
+        assert off[:, 3:].max() < 1e-3 * largest[1], n
+
+
+@pytest.mark.parametrize("name", SHAFTS)
+def test_loss_and_loads_of_the_outer_shafts_are_those_of_the_reference(name: str) -> None:
+    result, _, _ = simulated(name)
+    with np.load(REFERENCE / "shafts.npz") as file:
+        loss, moment, lateral = (file[f"{name}__{key}"] for key in ("loss", "moment", "lateral"))
+    assert result["loss_max"][-1] == pytest.approx(loss, rel=1e-3)
+    assert result["moment_orders_max"][0, 1] == pytest.approx(moment[2], rel=1e-3)
+    if name == "shaft_W":  # large enough to be told from the ringing
+        assert result["lateral_orders_max"][:, 1] == pytest.approx(lateral[:, 2], rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("alphas", "arrangement", "plane", "offset"),
+    [((8, 8), "W", 0.0, 0.0), ((8, 6), "Z", np.pi, 0.0), ((12, 5), "50 deg", np.radians(50), 0.2)],
+)
+def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: float, offset: float) -> None:
+    """Forces and moments across the outer shafts at 20 rpm, within 1 %; a light preload leaves nothing loose."""
+    first, second = np.radians(alphas)
+    shaft = drive_shaft(second, arrangement, offset=f"{offset} rad")
+    sections = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}
+    rows, mechanism = held(alpha=first, speed=20 * RPM, drive_shaft=shaft, **sections)
+    found = simulate_rows(rows, Options(max_refinements=0), "full", mechanism=mechanism)
+    assert found.results["status"][0] in SIMULATED
+    loads = found.histories["shafts"][0]
+    expected = on_shafts(np.arange(180) * np.radians(2), (first, second), plane, offset, 1.2, 100.0)
+    for k, (force, moment) in enumerate((expected[:2], expected[2:])):
+        largest = np.linalg.norm(moment, axis=1).max()
+        off = np.linalg.norm(loads[:, k, :2], axis=1) - np.linalg.norm(force, axis=1)
+        assert np.abs(off).max() < 0.01 * largest / 1.2  # forces are moments over the shaft's length
+        off = np.linalg.norm(loads[:, k, 3:5], axis=1) - np.linalg.norm(moment, axis=1)
+        assert np.abs(off).max() < 0.01 * largest

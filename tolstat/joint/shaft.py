@@ -1,0 +1,160 @@
+"""The drive shaft of two joints: joint 2, and the tubes between the joints (docs/model.md, "Drive shaft")."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from tolstat.common import units
+from tolstat.common.cardan import SHAFT, SPLINED
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.units import POSITIVE
+from tolstat.joint.material import Array
+from tolstat.joint.orders import check_misalignment
+from tolstat.joint.sections import Length, Spline, Stiffness
+
+PLANES = {"Z": math.pi, "W": 0.0}
+"""Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
+STEEL = 7850.0
+"""Density of a tube that is given by its section, kg/m^3."""
+
+
+class Tube(Strict):
+    """A tube with its forks: its section, of steel, or its mass and moments of inertia."""
+
+    diameter: Length | None = Field(default=None, examples=["76 mm"])
+    """outer diameter"""
+    wall: Length | None = Field(default=None, examples=["2.5 mm"])
+    """thickness of the wall"""
+    mass: Annotated[units.Mass, POSITIVE] | None = Field(default=None, examples=["5 kg"])
+    """mass"""
+    inertia: Annotated[units.Inertia, POSITIVE] | None = Field(default=None, examples=["0.005 kg*m^2"])
+    """moment of inertia about its axis"""
+    inertia_across: Annotated[units.Inertia, POSITIVE] | None = Field(default=None, examples=["0.15 kg*m^2"])
+    """moment of inertia about an axis across it, through its mass centre"""
+    centre: Length | None = Field(default=None, examples=["0.3 m"])
+    """distance of its mass centre from the joint that it carries, of a single tube from joint 1; when left out: half of
+    its length"""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Tube:
+        ways = ("diameter", "wall"), ("mass", "inertia", "inertia_across")
+        given = [[key for key in way if getattr(self, key) is not None] for way in ways]
+        section, mass = (" and ".join(keys) for keys in given)
+        if all(given):
+            raise refuse(f"has {section} beside {mass}", f"remove {section}, or {mass}")
+        if not any(given):
+            raise refuse("has neither a section nor a mass", 'give diameter = "76 mm" and wall = "2.5 mm", of yours')
+        way = ways[0] if given[0] else ways[1]
+        if lacking := [key for key in way if getattr(self, key) is None]:
+            raise refuse(f"has {section or mass} without {' and '.join(lacking)}", f"add {' and '.join(lacking)}")
+        if self.wall is not None and self.diameter is not None and self.wall > 0.5 * self.diameter:
+            raise refuse("its wall is thicker than half of its diameter", "check wall and diameter")
+        return self
+
+    def body(self, length: float) -> tuple[float, Array]:
+        """Mass (kg) and moments of inertia about x, y, z (kg m^2) of a tube of a length (m)."""
+        if self.diameter is None or self.wall is None:
+            across, about = self.inertia_across or 0.0, self.inertia or 0.0
+            return self.mass or 0.0, np.array([across, across, about])
+        outer, inner = 0.5 * self.diameter, 0.5 * self.diameter - self.wall
+        mass = STEEL * math.pi * (outer**2 - inner**2) * length
+        about = 0.5 * mass * (outer**2 + inner**2)
+        across = 0.5 * about + mass * length**2 / 12
+        return mass, np.array([across, across, about])
+
+
+class SplineOfTubes(Spline):
+    """Spline between the tubes: they slide in one another, unless it sticks."""
+
+    at: Length = Field(examples=["0.6 m"])
+    """distance from joint 1"""
+    k_lateral: Stiffness = 2e8
+    """stiffness across"""
+    k_bending: Annotated[units.RotaryStiffness, POSITIVE] = 1e6
+    """stiffness against bending"""
+    k_torsion: Annotated[units.RotaryStiffness, POSITIVE] = 1e5
+    """stiffness against torsion"""
+    axial_damping: units.Damping = 2e3
+    """damping of the motion along it"""
+
+
+class Lumped(NamedTuple):
+    """A tube as a lump: its mass centre's distance from joint 1 (m), mass (kg), moments of inertia (kg m^2)."""
+
+    at: float
+    mass: float
+    inertia: Array
+
+
+class DriveShaft(Strict):
+    """Drive shaft of two joints: the second one, and what is between them. Both are the joint of the study."""
+
+    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
+    """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
+    arrangement: Annotated[float | str, units.Quantity("rad", words=tuple(PLANES))] = Field(examples=["Z"])
+    """`Z`: the outer shafts point the same way, at equal misalignments they are parallel; `W`: both bend the same way;
+    or the angle of the plane of joint 2 ahead of that of joint 1, about the tube"""
+    offset: units.Angle = Field(default=0.0, examples=["5 deg"])
+    """angle of the input fork of joint 2 ahead of where, at equal misalignments, the output turns evenly: the fault of
+    the forks' phase"""
+    length: Length = Field(examples=["1.2 m"])
+    """distance of the centres of the two joints"""
+    tube: Tube
+    """The tube; with a spline, that of joint 1"""
+    tube2: Tube | None = None
+    """The tube of joint 2, where a spline is; when left out: like that of joint 1"""
+    spline: SplineOfTubes | None = None
+    """Spline between two tubes; without it there is one tube"""
+
+    @model_validator(mode="after")
+    def _fits(self) -> DriveShaft:
+        if self.spline is None and self.tube2 is not None:
+            raise refuse("has tube2 without a spline", "remove tube2, or add [shaft.spline]")
+        if self.spline is not None and self.spline.at >= self.length:
+            raise refuse("spline.at = {spline.at} is not between the joints", "give less than length", "spline.at")
+        return self
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> DriveShaft:
+        """Drive shaft from its values in SI units, as result files hold them."""
+        parts: dict[str, type[Strict]] = {"tube": Tube, "tube2": Tube, "spline": SplineOfTubes}
+        made = {key: part.model_construct(**values[key]) for key, part in parts.items() if values.get(key)}
+        return cls.model_construct(**{**values, **made})
+
+    @property
+    def in_words(self) -> str:
+        """``"Z arrangement, joint 2 of 6 deg, offset 5 deg"``."""
+        turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
+        how = self.arrangement if isinstance(self.arrangement, str) else f"{math.degrees(self.arrangement):.4g} deg"
+        return f"{how} arrangement, joint 2 of {math.degrees(self.alpha):.4g} deg{turned}"
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What is simulated, without what the joints have beside."""
+        return SHAFT if self.spline is None else SPLINED
+
+    @property
+    def plane(self) -> float:
+        """Angle of the plane of joint 2 ahead of that of joint 1, about the tube, rad."""
+        return PLANES[self.arrangement] if isinstance(self.arrangement, str) else self.arrangement
+
+    @property
+    def tubes(self) -> dict[str, Lumped]:
+        """The tubes by name of their lump."""
+        if self.spline is None:
+            at = 0.5 * self.length if self.tube.centre is None else self.tube.centre
+            return {"tube": Lumped(at, *self.tube.body(self.length))}
+        first, second = self.tube, self.tube2 or self.tube
+        lengths = self.spline.at, self.length - self.spline.at
+        before = 0.5 * lengths[0] if first.centre is None else first.centre
+        behind = 0.5 * lengths[1] if second.centre is None else second.centre
+        return {
+            "tube1": Lumped(before, *first.body(lengths[0])),
+            "tube2": Lumped(self.length - behind, *second.body(lengths[1])),
+        }

@@ -77,7 +77,8 @@ def new(
         faults.append(Fault("--joint", "cannot be used together with --signal", "name a study with the joint: --base"))
     if shaft and (signal is not None or joint is not None):
         given = " and ".join(f"--{name}" for name, value in (("joint", joint), ("signal", signal)) if value is not None)
-        faults.append(Fault("--shaft", f"cannot be used together with {given}", "name the joint in the study, or --size"))
+        remedy = "name the joint or the signal in the study that it writes"
+        faults.append(Fault("--shaft", f"cannot be used together with {given}", remedy))
     if size is not None and not shaft:
         faults.append(Fault("--size", "is the size of the crosses of a drive shaft", "give --shaft, too"))
     if signal is not None and path.exists():

@@ -39,13 +39,18 @@ class Cross(NamedTuple):
 
     def words(self) -> dict[str, str]:
         """Return what stands in the template of a joint: the row, and what follows from it by proportions."""
-        pin = self.radius_mm - 0.9 * self.pin_mm
+        pin, arm = self.radius_mm - 0.9 * self.pin_mm, 1.1 * self.cup_mm
         derived = {
             "R_mm": self.radius_mm,
             "pitch_diameter_mm": self.pin_mm + self.needle_diameter_mm,
-            **{"pin_l_mm": pin, "pin_short_mm": 0.8 * pin, "pin_long_mm": 1.2 * pin},
-            **{"arm_width_mm": 1.3 * self.cup_mm, "arm_depth_mm": 0.5 * self.cup_mm, "arm_l_mm": 1.1 * self.cup_mm},
-            **{"arm_short_mm": 0.77 * self.cup_mm, "arm_long_mm": 1.43 * self.cup_mm},
+            "pin_l_mm": pin,
+            "pin_short_mm": 0.8 * pin,
+            "pin_long_mm": 1.2 * pin,
+            "arm_width_mm": 1.3 * self.cup_mm,
+            "arm_depth_mm": 0.5 * self.cup_mm,
+            "arm_l_mm": arm,
+            "arm_short_mm": 0.7 * arm,
+            "arm_long_mm": 1.3 * arm,
         }
         given = {name: value if isinstance(value, str) else f"{value:g}" for name, value in self._asdict().items()}
         return given | {name: f"{value:.3g}" for name, value in derived.items()}

@@ -1,4 +1,4 @@
-"""A new study with comments that runs as it stands, of a joint or of a drive shaft, its schema for editors, and a joint."""
+"""A new study with comments that runs as it stands, of a joint or a drive shaft, schemas for editors, and a joint."""
 
 from __future__ import annotations
 
@@ -115,9 +115,13 @@ def study_text(path: Path, base: str, limits: tuple[str, str] = LIMIT) -> str:
 def _shaft_text(path: Path, base: str, torque: float, length: float, pin_force: float) -> str:
     """Study of a drive shaft of a rated torque (N m), which presses on a pin (kN), and length over two cups (mm)."""
     numbers = {
-        **{"cruise": 0.3 * torque, "climb": 0.6 * torque, "start": torque},
-        **{"tube": 0.9 * length, "spline": 0.45 * length},
-        **{"bearing": 1.5 * torque + 200.0, "pin_force": 1.05 * pin_force},  # a few per cent of the shafts exceed one
+        "cruise": 0.3 * torque,
+        "climb": 0.6 * torque,
+        "start": torque,
+        "tube": 0.9 * length,
+        "spline": 0.45 * length,
+        "bearing": 1.5 * torque + 200.0,  # limits that a few per cent of the shafts exceed
+        "pin_force": 1.05 * pin_force,
     }
     return _filled("shaft.toml", path, joint=base, **{name: f"{float(f'{x:.3g}'):g}" for name, x in numbers.items()})
 

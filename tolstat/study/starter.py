@@ -12,7 +12,7 @@ from typing import Any
 from tolstat.common import strict
 from tolstat.common.errors import Fault, input_error, raise_all
 from tolstat.common.files import atomic_write, data_dir
-from tolstat.study import crosses, rewriting
+from tolstat.study import cross_sizes, rewriting
 from tolstat.study.schema import KINDS, schema
 
 HEADER = "#:schema ./{}.schema.json\n"
@@ -63,7 +63,7 @@ def write_shaft(path: Path, size: str | None) -> list[Path]:
     path : Path
         The study; its folder is made.
     size : str, optional
-        Size of the crosses in the table of `crosses`; without it the joints are `SHAFT_JOINT`.
+        Size of the crosses in the table of `cross_sizes`; without it the joints are `SHAFT_JOINT`.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def write_shaft(path: Path, size: str | None) -> list[Path]:
     """
     if size is None:
         return _write(path, _shaft_text(path, *SHAFT_JOINT), None)
-    row = crosses.cross(size)
+    row = cross_sizes.cross(size)
     study = _shaft_text(path, _beside(path), row.torque_Nm, row.length_mm, row.pin_force_kN)
     return _write(path, study, joint_text("cross.toml", row.words()))
 

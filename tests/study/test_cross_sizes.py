@@ -16,14 +16,14 @@ from tolstat import study
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.study import crosses, starter
+from tolstat.study import cross_sizes, starter
 
-SIZES = [row.size for row in crosses.crosses()]
+SIZES = [row.size for row in cross_sizes.crosses()]
 PTO = 2.0 * math.pi * 540.0 / 60.0
 """Speed of the powers in the table, rad/s."""
 
 
-def tabulated_factor(row: crosses.Cross) -> float:
+def tabulated_factor(row: cross_sizes.Cross) -> float:
     """Factor f_c of ISO 281:2007, table 7, between its values."""
     ratios = [0.10, 0.12, 0.14, 0.16]
     values = [84.2, 86.4, 87.7, 88.5]
@@ -33,8 +33,8 @@ def tabulated_factor(row: crosses.Cross) -> float:
     return values[after - 1] + share * (values[after] - values[after - 1])
 
 
-@pytest.mark.parametrize("row", crosses.crosses(), ids=SIZES)
-def test_what_no_source_gives_follows_from_the_formulas_of_the_table(row: crosses.Cross) -> None:
+@pytest.mark.parametrize("row", cross_sizes.crosses(), ids=SIZES)
+def test_what_no_source_gives_follows_from_the_formulas_of_the_table(row: cross_sizes.Cross) -> None:
     assert row.size == f"{row.cup_mm:g} x {row.length_mm:g}"
     assert row.pin_mm == pytest.approx(0.62 * row.cup_mm, abs=0.051)
     assert (row.needle_diameter_mm, row.needle_length_mm) == (round(0.18 * row.cup_mm) / 2, 0.5 * row.cup_mm)
@@ -50,7 +50,7 @@ def test_what_no_source_gives_follows_from_the_formulas_of_the_table(row: crosse
 
 
 def test_the_same_cup_bears_the_same_force() -> None:
-    assert crosses.cross("27 x 81.8").pin_force_kN == pytest.approx(crosses.cross("27 x 74.6").pin_force_kN, rel=1e-3)
+    assert cross_sizes.cross("27 x 81.8").pin_force_kN == pytest.approx(cross_sizes.cross("27 x 74.6").pin_force_kN, rel=1e-3)
 
 
 @pytest.mark.parametrize("size", [None, *SIZES])
@@ -67,7 +67,7 @@ def test_a_new_shaft_is_a_study_without_warnings(tmp_path: Path, size: str | Non
         assert max(map(len, text.splitlines())) <= 130
         assert "$" not in text
     if size is not None:
-        row, joint = crosses.cross(size), loaded.joint
+        row, joint = cross_sizes.cross(size), loaded.joint
         assert joint.bearing is not None
         assert joint.bearing.lacking(FOR_LIFE) == []
         assert joint.cross.R + 0.5 * joint.contact.z == pytest.approx(
@@ -79,7 +79,7 @@ def test_a_new_shaft_is_a_study_without_warnings(tmp_path: Path, size: str | Non
 
 @pytest.mark.parametrize("size", ["27x81.8", "27 X 81,8 mm", "27 mm × 81.8 mm"])
 def test_a_size_may_be_written_in_several_ways(size: str) -> None:
-    assert crosses.cross(size).size == "27 x 81.8"
+    assert cross_sizes.cross(size).size == "27 x 81.8"
 
 
 def test_an_unknown_size_is_refused_with_those_that_are_known(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
 from tolstat.joint.model import GIVEN_BY
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
-from tolstat.joint.shaft import Spline, Tube
+from tolstat.joint.shaft import SplineOfTubes, Tube
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
@@ -226,7 +226,7 @@ def tables() -> dict[str, str]:
         "partner": Partner,
         "fit": FitEntry,
         "tube": Tube,
-        "spline": Spline,
+        "spline": SplineOfTubes,
     }
     return (
         found

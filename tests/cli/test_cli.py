@@ -21,6 +21,7 @@ from tolstat.cli import LISTED
 from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Simulation, Status
+from tolstat.display.answer import Answer
 from tolstat.store import ResultFile
 
 COMMANDS = tuple(LISTED)
@@ -385,6 +386,7 @@ def case(tmp_path):
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
     monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("newton_failed", None))
+    monkeypatch.setattr("tolstat.report.parts.of_case", lambda *_: Answer("simulate", "Joint", []))
     done = call("simulate", case)
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "N", "-", "1", "-"]
@@ -397,6 +399,7 @@ def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("ok", 1.5))
+    monkeypatch.setattr("tolstat.report.parts.of_case", lambda *_: Answer("simulate", "Joint", []))
     text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", 'cross.r_b = "10 mm"\n[operation]')
     if command == "simulate":
         text = text.partition("[tolerances]")[0]

@@ -43,9 +43,7 @@ def shaft(request):
     rng, bent = np.random.default_rng(5), drive_shaft(0.25, offset="0.4 rad", **request.param)
     mechanism = SPLINED if bent.spline else SHAFT
     errors = {f"{part}.offset_t": rng.normal(0, 2e-5) for pair in mechanism.pairs for part in (pair.pin, pair.hole)}
-    rows, found = held(
-        errors | ({"operation.spline": 0.6} if bent.spline else {}), 0.4, 80.0, drive_shaft=bent, shaft=FREE
-    )
+    rows, found = held(errors | ({"shaft.spline": 0.6} if bent.spline else {}), 0.4, 80.0, drive_shaft=bent, shaft=FREE)
     assert found == mechanism
     par, lumps = rows[0], len(mechanism.lumps)
     par.clearance[:] = 1e-5

@@ -10,7 +10,7 @@ from tests.conftest import ROOT
 from tolstat import study
 from tolstat.analysis.sensitivity import first_order
 from tolstat.campaign.run import run
-from tolstat.common.errors import NotApplicable
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.questions.shafts import interval, shares_of_variance
 from tolstat.store import ResultFile
 
@@ -97,3 +97,43 @@ def test_intervals_contain_the_share_of_shafts(alike, width):
 
         low, high = clopper_pearson(counts, n)
         assert np.mean((low <= truth) & (truth <= high)) < 0.9
+
+
+def test_a_duty_cycle_of_a_shaft_is_looked_at_point_by_point(tmp_path):
+    """Of several pairs of points none is taken silently."""
+    head, *points = STUDY.read_text().replace(*CHEAP).replace("n = 60", "n = 4").split("[[operation]]")
+    points[1], sep, tail = points[1].partition("[tolerances]")
+    slow = [point.replace('name = "', 'name = "slow-').replace("1500 rpm", "500 rpm") for point in points]
+    (tmp_path / "a.toml").write_text("[[operation]]".join([head, *points, *slow]) + sep + tail)
+    run(study.load(tmp_path / "a.toml"), tmp_path / "a.h5", workers=1, check=False)
+    with ResultFile.open(tmp_path / "a.h5") as file:
+        with pytest.raises(StoreError, match=r"has 4 operating points with a partner\n.*--point FIRST\+SECOND"):
+            tolstat.shafts(file.view())
+        slow_shaft = tolstat.shafts(file.view().at("slow-first+slow-second"))
+    ideal = {row["quantity"]: row["ideal"] for row in slow_shaft.frame("output").to_dict("records")}
+    assert ideal["angular acceleration"] == pytest.approx(0.01 * 2 * (500 * np.pi / 30) ** 2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "keys"),
+    [
+        ('"before", alpha = "12 deg"', '"before", alpha = "10 deg"', "alpha"),
+        ('"before", alpha', '"before", offset = "90 deg", alpha', "partner.offset"),
+        ('"after", alpha = "12 deg", inertia = "0.02', '"after", alpha = "12 deg", inertia = "0.03', "partner.inertia"),
+    ],
+)
+def test_a_shaft_entered_twice_must_not_contradict_itself(tmp_path, old, new, keys):
+    text = STUDY.read_text()
+    first, second = text.split('name = "second"')
+    unlike = first.replace('"after", alpha = "12', '"after", alpha = "8'), second.replace("12 deg", "8 deg", 1)
+    (tmp_path / "a.toml").write_text('name = "second"'.join(unlike))
+    assert study.load(tmp_path / "a.toml").points[1].operation.alpha == np.radians(8.0)
+    assert old in text
+    (tmp_path / "a.toml").write_text(text.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        study.load(tmp_path / "a.toml")
+    assert (
+        f"operation: 'first' and 'second' are the two joints of a shaft, and contradict each other in {keys}\n"
+        "  hint: give both the same, each alpha as the other's partner.alpha"
+    ) in str(caught.value)
+    assert len(caught.value.faults) == 1

@@ -31,7 +31,7 @@ SHAFTS = {
 @cache
 def simulated(name: str):
     """Result, histories and mechanism of a reference shaft in 720 steps."""
-    errors = {"operation.spline": 1.0} if name == "shaft_Z_force" else {}
+    errors = {"shaft.spline": 1.0} if name == "shaft_Z_force" else {}
     rows, mechanism = held(errors, alpha=EIGHT, speed=500 * RPM, drive_shaft=SHAFTS[name], **SECTIONS)
     options = Options(steps_per_rev=720, max_refinements=0)
     found = simulate_rows(rows, options, "full", mechanism=mechanism)

@@ -255,7 +255,7 @@ FAULTS = {
     "unknown case": (('["b"]', '["c"]'), "variant[1].cases: no case 'c'"),
     "case of two names": (('name = "a"', 'name = "b"'), "case[1].name: a case 'b' exists already"),
     "ideal by hand": (('name = "a"', 'name = "ideal"'), "case[0].name: a case 'ideal' exists already"),
-    "no errors": (('errors.hole4.offset_t = "0.1 mm"', "errors = {}"), "case[0].errors"),
+    "no errors": (('errors.hole4.offset_t = "0.1 mm"', "errors = {}"), "case[0]: has neither errors nor file"),
     "no unit": (('"0.1 mm"', "0.1"), "case[0].errors.hole4.offset_t: 0.1 has no unit"),
     "error of nothing": (("hole4.offset_t", "hole5.offset_t"), "case[0].errors.hole5.offset_t: selects nothing"),
     "operation as error": (("hole4.offset_t", "operation.alpha"), "operation.alpha: is not an error"),

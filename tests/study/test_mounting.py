@@ -202,3 +202,62 @@ def test_a_note_where_nothing_holds_pins_along_their_holes() -> None:
     assert "without thrust faces" in note_on_pins(["pin1.offset_t", "hole3.offset_e"], free)
     assert not note_on_pins(["pin1.offset_t", "hole1.position_inner"], free)
     assert not note_on_pins(["pin1.offset_t", "hole3.offset_e"], held)
+
+
+SPLINE = ('shaft.axial = "free"\n', 'shaft.axial = "free"\nshaft.spline = { mu = 0.1, diameter = "40 mm" }\n')
+DUTY = """[[operation]]
+name = "cruise"
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+axial_force = "-200 N"
+[[operation]]
+name = "reverse"
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "-300 N*m"
+"""
+
+
+def test_the_force_of_a_spline_follows_the_torque_of_each_point_and_joint(tmp_path: Path) -> None:
+    """2 mu |T|/d at most, added to the force of the point: 500 N at 100 N m, 1500 N at -300 N m; mu 0.1, d 40 mm."""
+    text = HEAD.partition("[operation]")[0] + DUTY + DRAWN
+    torque = '[tolerances]\noperation.torque = { plus_minus = "10 N*m", distribution = "uniform" }\n'
+    s = load(tmp_path, SPLINE, ("[tolerances]\n", torque), text=text)
+    assert s.tolerances["shaft.spline"].describe() == {"distribution": "uniform", "lower": -1.0, "upper": 1.0}
+    errors = sampling.draw(s)
+    own = errors["shaft.spline"]
+    assert own[0] == 0.0
+    assert -1.0 < own.min() < -0.9 < 0.9 < own.max() < 1.0
+    for point, force in zip(s.points, (-200.0, 0.0), strict=True):
+        at = point.operation.torque + errors["operation.torque"]
+        expected = force + own * 2.0 * 0.1 * np.abs(at) / 0.04
+        np.testing.assert_allclose(perturb(s.joint, point.operation, errors)["F_a"], expected, rtol=1e-13)
+    assert s.no_closed_form == [NO_CLOSED_FORM]
+    assert s.mechanism is MECHANISMS["cardan+spline"]
+
+
+def test_the_tolerance_of_a_spline_can_be_written(tmp_path: Path) -> None:
+    narrow = '[tolerances]\nshaft.spline = { plus_minus = 0.5, distribution = "uniform" }\n'
+    s = load(tmp_path, SPLINE, ("[tolerances]\n", narrow))
+    assert s.tolerances["shaft.spline"].describe()["upper"] == 0.5
+    assert list(s.tolerances).count("shaft.spline") == 1
+    fixed = load(tmp_path, SPLINE, ("[tolerances]\n", "[errors]\nshaft.spline = 1.0\n[tolerances]\n"))
+    assert "shaft.spline" not in fixed.tolerances
+    assert fixed.errors == {"shaft.spline": 1.0}
+
+
+def test_a_spline_is_refused_where_it_means_nothing(tmp_path: Path) -> None:
+    rigid = ('shaft.axial = "free"\n', "")
+    assert f"joint.shaft.spline: {NO_EFFECT}" in faults(tmp_path, SPLINE, rigid, NO_FORCE)
+    wrong = SPLINE[1].replace("0.1", "1.2"), SPLINE[1].replace("40 mm", "-40 mm")
+    assert "shaft.spline.mu: 1.2 is above 1" in faults(tmp_path, (SPLINE[0], wrong[0]))
+    assert "shaft.spline.diameter" in faults(tmp_path, (SPLINE[0], wrong[1]))
+    without = '[tolerances]\nshaft.spline = { plus_minus = 1, distribution = "uniform" }\n'
+    assert "only joints with joint.shaft.spline have it" in faults(tmp_path, ("[tolerances]\n", without))
+
+
+def test_a_case_says_which_force_is_stuck(tmp_path: Path) -> None:
+    path = tmp_path / "case.toml"
+    path.write_text(HEAD.replace(*SPLINE) + '[errors]\nshaft.spline = "-1"\n', encoding="utf-8")
+    assert study.load_case(path).errors == {"shaft.spline": -1.0}

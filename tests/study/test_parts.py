@@ -166,3 +166,11 @@ def test_a_grade_is_distance_times_speed() -> None:
     unbalance = {"grade": "16 mm/s", "mass": "5 kg", "speed": "3000 rpm", "angle": "30 deg"}
     rows, _ = held({"shaft.unbalance_angle": np.radians(60.0)}, shaft={"unbalance": unbalance})
     np.testing.assert_allclose(rows["unbalance"][0], [0.0, 5 * 0.016 / (100 * np.pi)], atol=1e-15)
+
+
+def test_a_spline_that_sticks_pulls_like_an_axial_force() -> None:
+    """2 mu T/d at 100 N m, mu 0.1, d 40 mm: 500 N."""
+    spline = {"spline": {"mu": 0.1, "diameter": "40 mm"}}
+    rows, mechanism = held({"shaft.spline": -0.5}, shaft=FREE | spline, axial_force=30.0)
+    assert mechanism.spline
+    assert rows["F_a"][0] == pytest.approx(30.0 - 250.0)

@@ -81,7 +81,7 @@ def test_a_study_takes_orders_from_a_file_and_keeps_them(tmp_path, head):
     assert [order.amplitude for order in own.torque_orders] == pytest.approx([40.0, 5.0], rel=1e-4)
     if head.startswith("angle"):
         np.testing.assert_allclose([order.phase for order in own.torque_orders], [0.5, -1.0], atol=1e-3)
-    assert "6 revolutions: < 1e-07 % of the variance does not repeat" in study.signals[1]
+    assert "6 revolutions: < 1e-07 % of the variance does not repeat" in study.notes[1]
     (tmp_path / "engine.csv").unlink()
     again = load(tmp_path, study.text.split("\n", 2)[2].split("[tolerances]")[0], REST)
     assert again.identity() == study.identity()
@@ -103,7 +103,7 @@ def test_a_result_file_needs_no_signal(tmp_path):
     with ResultFile.open(tmp_path / "a.h5") as file:
         assert [order.n for order in file.operation.torque_orders] == [2, 6]
         assert file.view().study.identity() == study.identity()
-    assert not extend(tmp_path / "a.h5", 4).signals
+    assert not extend(tmp_path / "a.h5", 4).notes
 
 
 def test_faults_of_a_signal_come_together(tmp_path):
@@ -168,6 +168,6 @@ def test_a_gap_is_named_and_orders_are_of_the_longest_part(tmp_path):
     study = load(tmp_path, text, REST)
     assert [order.n for order in study.operation.torque_orders] == [2, 6]
     assert [order.amplitude for order in study.operation.torque_orders] == pytest.approx([40.0, 5.0], rel=1e-3)
-    (note,) = [note for note in study.signals if "gap" in note]
+    (note,) = [note for note in study.notes if "gap" in note]
     assert "engine.csv:903: gap of 4.95" in note
     assert "orders are of the longest part without a gap" in note

@@ -158,8 +158,12 @@ def test_a_case_is_read(tmp_path: Path) -> None:
         "pin2.diameter": pytest.approx(-1e-5),
     }
     assert case.solver == Solver()
-    with pytest.raises(InputError, match="limits: unknown key"):
-        study.load_case(write(tmp_path, text=CASE + "[limits]\npsi = 1e-3\n"))
+    assert study.load_case(write(tmp_path, text=CASE + "[limits]\npsi = 1e-3\n")).limits == {"psi": 1e-3}
+    with pytest.raises(InputError, match="fatigue: unknown key"):
+        study.load_case(write(tmp_path, text=CASE + "[fatigue]\n"))
+    with pytest.raises(InputError, match=r"operation.*speed") as caught:
+        study.load_case(write(tmp_path, text=CASE.replace("500 rpm", "x") + "[limits]\npsi = -1\n"))
+    assert len(caught.value.faults) == 2
 
 
 def test_a_joint_beside_the_study(tmp_path: Path) -> None:

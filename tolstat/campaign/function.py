@@ -21,7 +21,7 @@ from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, input_error, raise_all
 from tolstat.common.loads import shown_loads, units_of_loads
-from tolstat.common.tables import Options
+from tolstat.common.tables import Options, tables
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
@@ -70,6 +70,9 @@ class Function:
         Gaussian copula of the errors.
     status : ndarray, (n,), uint8
         `Status` of the joints of the last call.
+    turning : dict of str to ndarray
+        Of the joints of the last call ``equivalent_load`` of each bearing, (n, pins), N; ``alpha`` of each Cardan
+        joint, (n, joints), rad; ``omega``, (n,), rad/s: what lives follow from.
     simulated : int
         Number of joints simulated so far.
     """
@@ -86,6 +89,7 @@ class Function:
         self.reason = whole or _dependence(study)[1]
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.turning: dict[str, Array] = {}
         self.simulated = 0
         self._inside = ExitStack()
 
@@ -147,11 +151,11 @@ class Function:
     @cached_property
     def nominal(self) -> Array:
         """Loads of the joint without errors, (m,), SI."""
-        status = self.status
+        of_last_call = self.status, self.turning
         try:
             return np.asarray(self._simulate(nominal_errors(1, self.study.mechanism), np.zeros(1, np.intp))[0])
         finally:
-            self.status = status
+            self.status, self.turning = of_last_call
 
     @cached_property
     def options(self) -> list[Options]:
@@ -248,6 +252,9 @@ class Function:
         for number in range(len(distinct)):
             here = np.flatnonzero(option == number)
             parts += [(here[first : first + size], distinct[number]) for first in range(0, here.size, size)]
+        of = tables(study.mechanism)
+        shapes = {"equivalent_load": of.RESULT, "alpha": of.PARAM, "omega": of.PARAM}
+        self.turning = {name: np.full((n, *table[name].shape), np.nan) for name, table in shapes.items()}
         blocks = (
             Block("", slots, parameters_of(study, variant[slots], errors[slots]), own, study.mechanism)
             for slots, own in parts
@@ -264,6 +271,8 @@ class Function:
             for block, result in finished:
                 table = results_of(block, result)
                 self.status[block.slots] = table["status"]
+                for name, values in self.turning.items():
+                    values[block.slots] = (table if name == "equivalent_load" else block.params)[name]
                 loads[block.slots] = loads_of(table, self.loads, study.mechanism)
         return loads
 

@@ -87,10 +87,10 @@ def _faults_of_names(
     if any(not isinstance(name, str) for name in unknown):
         remedy = "give names such as 'pin1.tilt_t'; of a table read with two lines of headers: x.droplevel(1, axis=1)"
         faults.append(Fault(place, f"have names that are no text: {_listed(unknown)}", remedy))
-    elif len(unknown) > MAX_NAMED:
+    elif len(unknown) > 1:
         faults.append(Fault(place, f"have unknown ones: {_listed(unknown)}", f"leave them out: x[f.{attribute}]"))
-    else:
-        faults += [Fault(place, f"{name!r} is unknown", did_you_mean(str(name), known)) for name in unknown]
+    elif unknown:
+        faults.append(Fault(place, f"{unknown[0]!r} is unknown", did_you_mean(str(unknown[0]), known)))
     return faults
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from tolstat.campaign import work as works
     from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
-    from tolstat.common import text_table as text_tables
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
     from tolstat.joint import sections
@@ -28,9 +27,9 @@ if TYPE_CHECKING:
     from tolstat.questions.exceedance import answer as exceedance
     from tolstat.questions.fatigue import loads as fatigue
     from tolstat.report import answer as reports
-    from tolstat.report import page
+    from tolstat.report import page, parts
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
-    from tolstat.study import assumptions, points, rewriting, starter
+    from tolstat.study import assumptions, crosses, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
@@ -40,14 +39,16 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("columns", "loads", "strict", "tables", "text_table", "units")
-    columns, load_units, strict, tables, text_tables, units = (Late(f"tolstat.common.{name}") for name in names)
+    names = ("columns", "loads", "strict", "tables", "units")
+    columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("accuracy", "joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
     accuracy, joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
-    names = ("report.answer", "report.page", "joint.sections")
-    reports, page, sections = (Late(f"tolstat.{name}") for name in names)
+    names = ("report.answer", "report.page", "report.parts", "joint.sections")
+    reports, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
-    names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")
-    assumptions, points, rewriting, schemas, spectra, starter = (Late(f"tolstat.study.{name}") for name in names)
+    names = ("assumptions", "crosses", "points", "rewriting", "schema", "spectrum", "starter")
+    assumptions, crosses, points, rewriting, schemas, spectra, starter = (
+        Late(f"tolstat.study.{name}") for name in names
+    )

@@ -253,11 +253,11 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[table
 def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
-    These are mounting and contact law; measured signals; warnings of its joints, of values that are probably not meant,
-    shares without an interval, and a note where rigid shafts meet errors along them.
+    These are mounting and contact law; notes on measured signals and joints; warnings of its joints, of values that are
+    probably not meant, shares without an interval, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
-    for note in study.signals:
+    for note in study.notes:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
     command = points.with_free_shaft(str(path), path.stem, study.joint)

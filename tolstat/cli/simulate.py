@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +11,7 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write, write_frame
+from tolstat.cli._shared import deliver, print_json, print_warnings, progress, say, warn, work, write, write_frame
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
@@ -18,12 +19,19 @@ from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPat
 FORMATS = (".svg", ".png", ".pdf")
 
 
-def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: AsJson = False) -> None:
+def simulate(
+    case: Annotated[Path, Opt("CASE")],
+    *,
+    table: Annotated[Path | None, Opt("CSV")] = None,
+    out: Trace = None,
+    as_json: AsJson = False,
+) -> None:
     """Simulate one joint, with and without its errors.
 
     Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
     the joint without errors: forces of the bushings, bending moments at the roots of pins and arms, contact forces of
-    the pins, and psi.
+    the pins, and psi. If CASE has limits, or the joint what rating lives need, prints which limits are exceeded, and
+    the lives of the bearings.
 
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
 
@@ -31,13 +39,25 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     ----------
     case : Path
         Case file (TOML): one joint with its errors.
+    table : Path, optional
+        Text table of a measured joint: a column for each error that was measured, one row. They take the place of those
+        of CASE.
     """
     loaded = library.studies.load_case(case)
+    if table is not None:
+        measured, notes = library.crosses.of_one(table, loaded.mechanism)
+        loaded = replace(loaded, errors=loaded.errors | measured)
+        for note in notes:
+            say(note)
     print_warnings(case, [loaded.joint])
     say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
-    _deliver(result, {}, out, as_json)
+    joints = library.parts.of_case(loaded, result)
+    _deliver(result, joints.values() if as_json and joints.parts else {}, out, as_json)
+    if joints.parts and not as_json:
+        typer.echo()
+        deliver(joints, wide=False)
 
 
 def replay(
@@ -126,11 +146,12 @@ def evaluate(
     """Simulate joints whose errors another program gives.
 
     The header of the CSV file has the names of errors, in any order; units stand there or below, or SI units hold.
-    Errors are deviations, those of operation.* from the operating point, as tolstat export writes them. The errors
-    in which joints of STUDY differ must be there; others that are not are those of STUDY. If STUDY has several
-    joints, a column variant says which. Other columns are left out and named. The output has a row for each joint in
-    the same order: its status, then its loads, with the names in the first line and the units in the second. A load
-    is empty where a joint has none.
+    Errors are deviations, those of operation.* from the operating point, as tolstat export writes them. Errors
+    without a column are those of [errors] of STUDY, or nominal, as is said. Zones of STUDY do not matter: joints have
+    offsets and tilts. If STUDY has several joints, a column variant says which. Other columns are left out and named.
+    The output has a row for each joint in the same order: its status, then its loads, with the names in the first line
+    and the units in the second. A load is empty where a joint has none. If STUDY has limits, or the joint what rating
+    lives need, prints which joints are beyond a limit, loads with limits, those of the shafts, and lives.
 
     Example: tolstat evaluate studies/iso2768_f.toml --in joints.csv --out y.csv
 
@@ -149,22 +170,25 @@ def evaluate(
     """
     if out != "-":
         check_target(Path(out), errors)
-    f = library.function.function(library.studies.load(study), loads, point=point, workers=workers)
+    whole = library.studies.load(study)
+    chosen = library.function.function(whole, loads, point=point)
+    shown_loads = library.parts.names_of(chosen.study.limits, whole.mechanism)
+    f = library.function.function(whole, [*chosen.loads, *shown_loads], point=point, workers=workers)
     names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
-    table = library.text_tables.TextTable(errors)
-    columns = table.numbers(units, names, 1, units)
-    table.check()
-    if others := [name for name in table.columns if name not in columns]:
-        of_results = {column.name for column in library.columns.result_columns(f.study.mechanism)}
-        results = [name for name in others if name in of_results]
-        listed = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
-        say(f"{errors}: columns left out: {', '.join(listed)}")
+    needed = [name for name in names if uniform or name == library.function.VARIANT]
+    varied = [name for name in names if name not in needed]
+    joints = library.crosses.read(errors, whole.mechanism, units, varied, needed)
+    for note in joints.notes:
+        say(note)
+    own = dict.fromkeys(library.tables.FACTORS, 1.0) | whole.errors
+    nominal = {name: np.full(len(joints.lines), own.get(name, 0.0)) for name in varied}
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
-        y = f(f.uniform(columns) if uniform else columns)
+        y = f(f.uniform(joints.columns) if uniform else nominal | joints.columns)
     unit_of = library.load_units.units_of_loads(f.study.mechanism)
-    head = [["status", *f.loads], ["", *(unit_of[name] for name in f.loads)]]
-    rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *y.T.tolist()])
+    head = [["status", *chosen.loads], ["", *(unit_of[name] for name in chosen.loads)]]
+    columns = y[:, : len(chosen.loads)].T.tolist()
+    rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *columns])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
     invalid = f.status[~np.isin(f.status, library.tables.VALID)]
     say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {invalid.size} of them without a valid load")
@@ -173,6 +197,10 @@ def evaluate(
         say(f"{int((invalid == state).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")
         if hint:
             say(f"  hint: {hint}")
+    if out != "-":
+        values, labels = dict(zip(f.loads, y.T, strict=True)), [f"line {line}" for line in joints.lines]
+        found = library.parts.parts(f.study, values, f.turning, labels, f.status)
+        deliver(library.answers.Answer("evaluate", "Joints", found), wide=False)
 
 
 def show(

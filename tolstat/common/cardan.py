@@ -95,6 +95,7 @@ def drive_shaft(name: str, *tubes: str) -> Mechanism:
         pairs=one.pairs + two.pairs,
         unknowns=two.unknowns,
         cardan=one.cardan + two.cardan,
+        spline=len(tubes) > 1,
     )
 
 
@@ -102,9 +103,9 @@ SHAFT = drive_shaft("shaft", "tube")
 """Drive shaft of two joints and a tube."""
 SPLINED = drive_shaft("splined shaft", "tube1", "tube2")
 """Drive shaft of two joints and two tubes, which slide in one another by a spline."""
-PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral")
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
-its first and its last shaft; unbalance of the last one, and displacement of it across its axis."""
+its first and its last shaft; unbalance of the last one, displacement of it across its axis, a spline that sticks."""
 
 
 def named(base: Mechanism, parts: Collection[str]) -> str:
@@ -124,6 +125,7 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
         unbalance="unbalance" in parts,
+        spline=base.spline or "spline" in parts,
     )
 
 

@@ -186,6 +186,8 @@ class Mechanism(NamedTuple):
         Whether pins rub in their holes.
     unbalance : bool
         Whether the last shaft has an unbalance.
+    spline : bool
+        Whether the last shaft has a spline that sticks, or one joins two tubes.
     waves : int
         Number of orders in the series of its members' angles.
     loaded : str
@@ -204,6 +206,7 @@ class Mechanism(NamedTuple):
     faces: tuple[Face, ...] = ()
     friction: bool = False
     unbalance: bool = False
+    spline: bool = False
     waves: int = 0
     loaded: str = ""
 
@@ -231,11 +234,6 @@ class Mechanism(NamedTuple):
     def rotations(self) -> tuple[str, ...]:
         """Those of `unknowns` that are rotations."""
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
-
-    @property
-    def has_spline(self) -> bool:
-        """Whether a given force acts along one of its bushings, that of a spline that sticks."""
-        return any(bushing.pushed for bushing in self.bushings)
 
     @property
     def is_shaft(self) -> bool:

@@ -232,9 +232,9 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     of_parts = (
         (mechanism.is_shaft, "shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
         (mechanism.is_shaft, "shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
-        (mechanism.has_spline, "operation.spline", "1", "force of the spline that friction holds, over the largest"),
         (mechanism.unbalance, "shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
         (mechanism.unbalance, "shaft.unbalance_angle", "rad", "deviation of its direction"),
+        (mechanism.spline, "shaft.spline", "1", "axial force of the sticking spline over 2 mu T/d, from -1 to 1"),
         (mechanism.friction, "friction.mu", "1", "deviation of the coefficient of friction"),
     )
     fields += [Field(name, unit, text) for there, name, unit, text in of_parts if there]

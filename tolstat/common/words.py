@@ -11,7 +11,9 @@ _MEANT = {
     "c0, c0r, static load rating": "the static load rating is used nowhere: leave it out; C is the dynamic one",
     "cr, dynamic load rating, load rating": "this is bearing.C under [joint]",
     "unbalance, imbalance, balance, balance grade": "this is shaft.unbalance under [joint]",
-    "spline, slip joint, length compensation": 'write shaft.axial = "free" under [joint]',
+    "spline, slip joint, length compensation": (
+        'write shaft.axial = "free" under [joint], and where it sticks shaft.spline = { mu = 0.1, diameter = "40 mm" }'
+    ),
     "spider, trunnion, journal": "the cross has pins: cross and pin under [joint], pin1 to pin4 elsewhere",
     "yoke": "the arms of a yoke are arm under [joint], their holes hole1 to hole4 elsewhere",
     "roller, needle bearing": "this is bearing under [joint], with needles and needle_length",

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
     from tolstat.joint.perturbation import MEANS as MEANS
+    from tolstat.joint.perturbation import SPLINE as SPLINE
     from tolstat.joint.perturbation import Operation as Operation
     from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
     from tolstat.joint.perturbation import mechanism_of as mechanism_of
@@ -28,7 +29,7 @@ _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": (
-        *("MEANS", "Operation", "OperationOfShaft"),
+        *("MEANS", "SPLINE", "Operation", "OperationOfShaft"),
         *("mechanism_of", "nominal_errors", "operating", "perturb"),
     ),
     "reading": ("load", "varied"),

@@ -26,7 +26,10 @@ from tolstat.joint.sections import RIGID, Arm, Bushing, Cross, Friction, Hub, Ma
 GIVEN_BY = dict(
     zip(
         PARTS,
-        ("thrust", "friction.mu", "shaft.input", "shaft.output", "shaft.unbalance", "shaft.lateral"),
+        (
+            *("thrust", "friction.mu", "shaft.input", "shaft.output"),
+            *("shaft.unbalance", "shaft.lateral", "shaft.spline"),
+        ),
         strict=True,
     )
 )

@@ -24,7 +24,7 @@ from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Spline
 from tolstat.joint.shaft import DriveShaft, Lumped
 
 Table = NDArray[np.void]
@@ -101,6 +101,8 @@ class OperationOfShaft(Operation):
 
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
+SPLINE = "shaft.spline"
+"""Error of what has a `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
@@ -128,15 +130,20 @@ def nominal_errors(n: int, mechanism: Mechanism) -> Table:
     return errors
 
 
-def operating(operation: Operation, errors: Table) -> dict[str, Array]:
+def operating(operation: Operation, errors: Table, spline: Spline | None = None) -> dict[str, Array]:
     """Values that joints have at an operating point: those of the point, and each joint's deviations from them.
+
+    The axial force includes that of the `spline`, which follows each joint's torque.
 
     Returns
     -------
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
+    values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
+    if spline is not None:
+        values["axial_force"] = values["axial_force"] + errors[SPLINE] * spline.largest_force(values["torque"])
+    return values
 
 
 def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
@@ -168,7 +175,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     for name, of_kinds in _of_kinds(joint, shaft).items():
         kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
         params[name] = [of_kinds[kind] for kind in kinds]
-    point = operating(operation, errors)
+    point = operating(operation, errors, joint.shaft.spline)
     params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     lumps = mechanism.lumps
     triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
@@ -202,7 +209,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
             play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if shaft is not None and shaft.spline is not None:
-        params["push"] = errors["operation.spline"] * shaft.spline.largest_force(params["torque"])
+        params["push"] = errors[SPLINE] * shaft.spline.largest_force(point["torque"])
     if joint.shaft.unbalance is not None:
         size = joint.shaft.unbalance.size + errors["shaft.unbalance"]
         angle = (joint.shaft.unbalance.angle or 0.0) + errors["shaft.unbalance_angle"]

@@ -15,6 +15,7 @@ from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
+from tolstat.joint.material import Array
 
 Length = Annotated[units.Length, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -38,7 +39,7 @@ def _poisson(nu: float) -> float:
 
 def _friction(mu: float) -> float:
     if mu > 1.0:
-        raise refuse("{mu} is above 1", "give the coefficient of friction of the bearings, such as 0.05", "mu")
+        raise refuse("{mu} is above 1", "give the coefficient of friction, such as 0.05", "mu")
     return mu
 
 
@@ -240,6 +241,19 @@ class Unbalance(Strict):
         return self.grade * self.mass / self.speed
 
 
+class Spline(Strict):
+    """Spline of the output shaft, which sticks with any axial force up to 2 mu T/d, T the torque of the joint."""
+
+    mu: Annotated[Ratio, AfterValidator(_friction)] = Field(examples=[0.1])
+    """coefficient of friction of its flanks"""
+    diameter: Length = Field(examples=["40 mm"])
+    """pitch diameter d"""
+
+    def largest_force(self, torque: Array) -> Array:
+        """Axial force (N) that its friction can hold at a torque (N m): 2 mu T/d."""
+        return abs(torque) * (2.0 * self.mu / self.diameter)
+
+
 class Shaft(Strict):
     """Output shaft, and what holds it along its axis; bearings of both shafts.
 
@@ -268,6 +282,9 @@ class Shaft(Strict):
     """Bearings of the output shaft, whose loads become known"""
     unbalance: Unbalance | None = None
     """Unbalance of the output shaft"""
+    spline: Spline | None = None
+    """Spline that sticks with a force of the error `shaft.spline`, from -1 to 1, times 2 mu T/d. In a study with
+    tolerances this error is uniform unless they say otherwise"""
 
     @field_validator("lateral")
     @classmethod

@@ -13,10 +13,10 @@ from tolstat.common import units
 from tolstat.common.cardan import SHAFT, SPLINED
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.units import NOT_NEGATIVE, POSITIVE
+from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
 from tolstat.joint.orders import check_misalignment
-from tolstat.joint.sections import Length, Stiffness
+from tolstat.joint.sections import Length, Spline, Stiffness
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
@@ -69,15 +69,11 @@ class Tube(Strict):
         return mass, np.array([across, across, about])
 
 
-class Spline(Strict):
-    """Spline between the tubes: they slide in one another, against what friction holds."""
+class SplineOfTubes(Spline):
+    """Spline between the tubes: they slide in one another, unless it sticks."""
 
     at: Length = Field(examples=["0.6 m"])
     """distance from joint 1"""
-    mu: Annotated[units.Number, NOT_NEGATIVE] = Field(default=0.0, examples=[0.1])
-    """coefficient of friction: a spline that sticks holds up to 2 mu T/diameter"""
-    diameter: Length | None = Field(default=None, examples=["40 mm"])
-    """mean diameter of its teeth; needed with friction"""
     k_lateral: Stiffness = 2e8
     """stiffness across"""
     k_bending: Annotated[units.RotaryStiffness, POSITIVE] = 1e6
@@ -86,16 +82,6 @@ class Spline(Strict):
     """stiffness against torsion"""
     axial_damping: units.Damping = 2e3
     """damping of the motion along it"""
-
-    @model_validator(mode="after")
-    def _has_diameter(self) -> Spline:
-        if self.mu > 0.0 and self.diameter is None:
-            raise refuse("has friction without diameter", 'give diameter = "40 mm", the mean diameter of its teeth')
-        return self
-
-    def largest_force(self, torque: Array) -> Array:
-        """Force along it (N) that friction can hold at a torque (N m): 2 mu T/diameter."""
-        return np.zeros_like(torque) if self.diameter is None else 2.0 * self.mu / self.diameter * np.abs(torque)
 
 
 class Lumped(NamedTuple):
@@ -123,7 +109,7 @@ class DriveShaft(Strict):
     """The tube; with a spline, that of joint 1"""
     tube2: Tube | None = None
     """The tube of joint 2, where a spline is; when left out: like that of joint 1"""
-    spline: Spline | None = None
+    spline: SplineOfTubes | None = None
     """Spline between two tubes; without it there is one tube"""
 
     @model_validator(mode="after")
@@ -137,7 +123,7 @@ class DriveShaft(Strict):
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> DriveShaft:
         """Drive shaft from its values in SI units, as result files hold them."""
-        parts: dict[str, type[Strict]] = {"tube": Tube, "tube2": Tube, "spline": Spline}
+        parts: dict[str, type[Strict]] = {"tube": Tube, "tube2": Tube, "spline": SplineOfTubes}
         made = {key: part.model_construct(**values[key]) for key, part in parts.items() if values.get(key)}
         return cls.model_construct(**{**values, **made})
 

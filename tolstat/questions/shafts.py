@@ -17,7 +17,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.joint import nominal_errors, perturb
 from tolstat.joint.orders import output_motion
-from tolstat.questions.shares import inapplicable, limit, share, shares, word
+from tolstat.questions.shares import inapplicable, limit, share, shares, unusable, word
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
@@ -126,7 +126,11 @@ def shafts(view: View) -> Answer:
 
 def _places(view: View) -> Shafts:
     """The views of the first and of the second joint."""
-    at = {partner.position: part for part in view.parts if (partner := part.store.operation.partner)}
+    joints = [(partner.position, part) for part in view.parts if (partner := part.store.operation.partner)]
+    at = dict(joints)
+    if len(joints) > len(at) == 2:
+        remedy = "give those of one shaft: --point FIRST+SECOND"
+        raise unusable(view, f"has {len(joints)} operating points with a partner", remedy)
     if len(at) < 2 or not view.sampled:
         remedy = 'give the file of a study with two operating points, with partner.position "after" and "before"'
         raise inapplicable(view, "holds no drive shaft of two joints", remedy)

@@ -21,6 +21,7 @@ from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import cases, sweep
 from tolstat.report.headline import headline, life_verdicts, tells_yield
+from tolstat.report.parts import of_listed
 from tolstat.solver import fidelity
 from tolstat.store import Reader, View, recorded, viewed
 
@@ -47,7 +48,8 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     if store.case_names or view.method == "sweep":
         answer = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
-        return Answer("report", view.name, [*stands_on, *answer.parts, *notes, *_run(view)])
+        one_by_one = of_listed(view) if store.case_names else []
+        return Answer("report", view.name, [*stands_on, *answer.parts, *one_by_one, *notes, *_run(view)])
     verdict, lives = headline(view, accepted), life_verdicts(view, accepted)
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
     if lives:

@@ -14,7 +14,7 @@ from tolstat.analysis.design import Design, Independent, Listed, Replicated
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
-from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
+from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
@@ -48,12 +48,16 @@ def operation_of(store: Reader, row: int) -> Operation:
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
     """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
-    errors = store.errors(slots, _OPERATION)
+    sticks = store.mechanism.spline
+    errors = store.errors(slots, (*_OPERATION, SPLINE) if sticks else _OPERATION)
+
+    def at(row: int, errors: NDArray[np.void]) -> dict[str, NDArray[np.float64]]:
+        return operating(operation_of(store, row), errors, joint_of(store, row).shaft.spline if sticks else None)
+
     if not store.variants:
-        return operating(store.operation, errors)
+        return at(0, errors)
     first, last, _ = slots.indices(store.n)
-    rows = (operating(operation_of(store, row), errors[row - first : row - first + 1]) for row in range(first, last))
-    each = list(rows)
+    each = [at(row, errors[row - first : row - first + 1]) for row in range(first, last)]
     return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
 
 

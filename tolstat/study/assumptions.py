@@ -79,7 +79,10 @@ def given(study: Study) -> tuple[str, ...]:
     Beside a spline so is ``shaft.axial``, since a second part that slides would hold nothing.
     """
     replaced = {entry.name for entry in study.assumed}
-    of_study = {*leaves(_keys_of_study(study)), *(("shaft.axial",) if study.mechanism.has_spline else ())}
+    of_study = {
+        *leaves(_keys_of_study(study)),
+        *(("shaft.axial",) if study.mechanism.spline and study.mechanism.is_shaft else ()),
+    }
     keys = derived.changed(of_study, leaves(study.joint.given("json")))
     return tuple(
         entry.name

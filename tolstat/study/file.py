@@ -7,7 +7,7 @@ be made, so that all faults are reported at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error, raise_a
 from tolstat.common.loads import load_of, loads_of, split, units_of_limits
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import DriveShaft, Joint, reading
+from tolstat.joint import SPLINE, DriveShaft, Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -25,19 +25,21 @@ from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.points import Point
-from tolstat.study.selection import Assignments, Reading, toleranced_units
+from tolstat.study.selection import Assignments, Entry, Reading, toleranced_units
 from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "shaft", "solver", "errors")
+OF_CASE = ("joint", "operation", "shaft", "solver", "errors", "limits")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
     *("tolerances", "correlation", "sampling", "sweep", "grid", "case", "variant", "assumed"),
-    *("limits", "fatigue", "output"),
+    *("fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
+OF_SHAFT = ("offset", "inertia", "stiffness")
+"""Keys of a partner that are the same at both joints of a drive shaft."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
 SCATTER = ("tolerances", "correlation", "errors")
@@ -100,6 +102,9 @@ def _scatter(file: Reading) -> Tolerances:
             with gather(file.faults):
                 file.claims.claim(entry, selected)
             written.append((entry, selected))
+    named = {*(file.errors or ()), *(name for _, selected in written for name in selected)}
+    if file.mechanism.spline and written and SPLINE not in named:
+        written.append((Entry(SPLINE, ("joint", SPLINE), {"plus_minus": 1.0, "distribution": "uniform"}), [SPLINE]))
     return kinds.read(written, file)
 
 
@@ -165,6 +170,7 @@ def _check(file: Reading) -> None:
         _check_sections(file, file.sampling)
         _check_method(file, file.sampling)
         _check_points(file, file.sampling)
+    _check_shaft(file, [point for point in file.points or () if point.operation.partner])
     if file.output is not None:
         _check_output(file, file.output)
     if file.output is not None and file.solver is not None:
@@ -189,14 +195,27 @@ def _check_method(file: Reading, sampling: Sampling) -> None:
     if sampling.joints_per_lot > 1 and not any("lot" in keys for keys in written):
         remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
         file.fault("sampling.joints_per_lot", "has no effect: no tolerance has a lot", remedy)
-    if sampling.method == "cases" and file.data.get("limits"):
-        file.fault("limits", "has no effect with 'cases'", "remove it: listed joints have no exceedance")
     if sampling.method == "subset":
         remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
         file.fault("sampling.method", "'subset' is set by tolstat rare, not in a study", remedy)
     joints = math.prod(axis.points for axis in file.sweep)
     if joints > MAX_ROWS:
         file.fault("sweep", f"gives {joints} joints", f"give at most {MAX_ROWS}")
+
+
+def _check_shaft(file: Reading, points: Sequence[Point]) -> None:
+    """Note that the points of the two joints of a drive shaft, the only ones with a partner, contradict each other."""
+    joints = {partner.position: (at.operation, partner) for at in points if (partner := at.operation.partner)}
+    if len(points) != 2 or len(joints) != 2:
+        return
+    (first, second), (later, earlier) = joints["after"], joints["before"]
+    pairs = {"alpha": ((first.alpha, second.alpha), (earlier.alpha, later.alpha))}
+    pairs |= {key: (getattr(first, key), getattr(later, key)) for key in ("speed", "torque")}
+    pairs |= {f"partner.{key}": (getattr(second, key), getattr(earlier, key)) for key in OF_SHAFT}
+    if differing := [key for key, (one, other) in pairs.items() if one != other]:
+        names = " and ".join(repr(point.name) for point in points)
+        found = f"{names} are the two joints of a shaft, and contradict each other in {', '.join(differing)}"
+        file.fault("operation", found, "give both the same, each alpha as the other's partner.alpha")
 
 
 def _check_points(file: Reading, sampling: Sampling) -> None:
@@ -305,18 +324,22 @@ def load_case(path: str | Path) -> Study:
     """
     file = Reading(Path(path), OF_CASE)
     if "sampling" in file.data:
-        raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
+        remedy = (
+            f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"
+        )
+        raise input_error(file.place, "is a study, not a case of one joint", remedy)
     _read(file, ["joint", "shaft"])
+    file.parts["points"] = ()
     with gather(file.faults):
-        file.parts["operation"] = points.operation(file)
-    _read(file, ["solver", "errors"])
+        file.parts["points"] = (Point("", points.operation(file), 1.0),)
+    _read(file, ["operation", "solver", "errors", "limits"])
     if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'
         file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
     if None in (file.joint, file.operation, file.solver, file.errors):
         file.finish()
     one, parts = Sampling(method="cases"), (file.joint, file.operation, file.solver, file.errors)
-    case = Study(file.path, file.text, *parts, one, Output(), (Point("", file.operation, 1.0),))
+    case = Study(file.path, file.text, *parts, one, Output(), file.points, limits=file.limits)
     with gather(file.faults):
         case.check_mounting()
     file.finish()

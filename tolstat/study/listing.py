@@ -17,7 +17,7 @@ from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD, laid_over, leaves, nested
-from tolstat.study import selection
+from tolstat.study import crosses, rewriting, selection
 from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube
 from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import Assignments, Entry, Reading, error_units
@@ -32,9 +32,19 @@ class CaseEntry(Strict):
     name: str = Field(min_length=1, examples=["tilt"])
     """name of the case"""
     errors: dict[str, Any] = Field(
-        min_length=1, json_schema_extra={"x-table": "errors"}, examples=[{"pin1.tilt_z": "0.5 deg"}]
+        default_factory=dict, json_schema_extra={"x-table": "errors"}, examples=[{"pin1.tilt_z": "0.5 deg"}]
     )
-    """errors by name or pattern, as in [errors]"""
+    """errors by name or pattern, as in [errors]; needed without `file`"""
+    file: str | None = Field(default=None, examples=["cross.csv"])
+    """in place of `errors`: text table of a measured joint, one row, with a column for each error that was measured"""
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        if self.file is None and not self.errors:
+            raise refuse("has neither errors nor file", 'give errors = { ... }, or file = "cross.csv"')
+        if self.file is not None and self.errors:
+            raise refuse("has errors beside file", "remove one of the two")
+        return self
 
 
 class Range(Strict):
@@ -227,8 +237,20 @@ def _cases(file: Reading, axes: list[Axis]) -> dict[str, dict[str, float]]:
             claims = Assignments(file.place, file.mechanism)
             for axis in axes:
                 claims.claim(axis.entry, axis.names)
-            cases[entry.name] = selection.fixed_errors(file, entry.errors, ("case", number, "errors"), claims)
+            errors = entry.errors if entry.file is None else _measured(file, entry.file, number)
+            cases[entry.name] = selection.fixed_errors(file, errors, ("case", number, "errors"), claims)
     return cases
+
+
+def _measured(file: Reading, name: str, number: int) -> dict[str, Any]:
+    """Errors of a measured joint as a study writes them; they take the place of the file in the study's text."""
+    measured, notes = crosses.of_one(file.folder / name, file.mechanism)
+    units_of = error_units(file.mechanism)
+    errors = {key: f"{value!r} {units_of[key]}" for key, value in measured.items()}
+    file.parts["notes"] = (*file.parts["notes"], *notes)
+    keys = {"file": None, "errors": errors}
+    file.text = rewriting.with_keys(file.text, {("case", number): keys}, file.place)
+    return errors
 
 
 def _note_clashes(file: Reading, axes: list[Axis]) -> None:

@@ -20,7 +20,7 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
+from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.orders import Partner
 from tolstat.joint.sections import FREE, RIGID
@@ -259,7 +259,8 @@ class Setting(NamedTuple):
 
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
+        pulled = {FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0
+        return self.joint.shaft.slides and bool(pulled)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -277,6 +278,7 @@ def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[K
     """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        paths += [("joint", "shaft", "spline")] * any(setting.joint.shaft.spline for setting in settings)
         remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
@@ -314,14 +316,18 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
         yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
     for path in dict.fromkeys((*setting.path, "partner") for setting in of_shafts if setting.operation.partner):
-        found = "stands beside [shaft]: both joints are simulated, none stands for the other"
-        yield path, found, "remove it, or [shaft]"
+        yield path, "stands beside [shaft], which simulates both joints", "remove it, or [shaft]"
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"
         yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
-    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).has_spline):
-        found = "is free beside a spline, which slides, too: nothing holds the shaft along its axis"
-        yield ("joint", "shaft", "axial"), found, 'write axial = "rigid", or remove shaft.spline'
+    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
+        yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
+    if any(setting.joint.shaft.spline for setting in of_shafts):
+        yield (
+            ("joint", "shaft", "spline"),
+            "is that of one joint",
+            "write shaft.spline, that of the tubes, or remove it",
+        )
     for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
         yield ("solver", "fidelity"), *texts
 
@@ -362,7 +368,7 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], mech
         Empty where a shaft may move or a spline gives way, or no error along the shafts scatters.
     """
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
-    if not along or mechanism.has_spline or any(value != RIGID for value in axial):
+    if not along or mechanism.spline or any(value != RIGID for value in axial):
         return ""
     return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from tolstat.common import units
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
+from tolstat.joint import SPLINE
 from tolstat.study import rewriting
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, kinds
@@ -91,7 +92,7 @@ class Tolerance(NamedTuple):
 
 
 def tolerances(study: Study) -> list[Tolerance]:
-    """Entries of a study that can be scaled, in its order; not those of operating point and material.
+    """Entries of a study that can be scaled, in its order; not those of operating point, material and spline.
 
     Left out are the position of an axis whose direction has a zone, too: that zone must stay the smaller one, and
     bounds where the middle is; and positions with a bonus with their diameters.
@@ -99,7 +100,7 @@ def tolerances(study: Study) -> list[Tolerance]:
     scalable = []
     for entry in study.entries:
         site, model = entry.models[0]
-        of_parts = not site.name.startswith(("operation.", "material."))
+        of_parts = not site.name.startswith(("operation.", "material.", SPLINE))
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
         if of_parts and not refined and model.scales:

@@ -256,7 +256,7 @@ class Reading:
     Attributes
     ----------
     text : str
-        TOML with mean and orders in place of measured signals.
+        TOML with mean and orders in place of measured signals, and errors in place of measured joints.
     data : dict
         Its tables as parsed.
     place : str
@@ -279,13 +279,13 @@ class Reading:
         self._source, self._has_lines = read_text(path) if text is None else text, text is None
         self.text, self.data = self._source, read_toml(path, self._source)
         self.faults: list[Fault] = []
-        self.parts: dict[str, Any] = {"signals": ()}
+        self.parts: dict[str, Any] = {"notes": ()}
         self.claims = Assignments(self.place, self.mechanism)
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
             raise input_error(self.place, "is a joint file, not a study or case", remedy)
         if "file" in self.text:
-            self.text, self.parts["signals"] = signals.replaced(self.text, self.data, path, self.faults)
+            self.text, self.parts["notes"] = signals.replaced(self.text, self.data, path, self.faults)
             self.data = read_toml(path, self.text)
         for key in self.data:
             if key not in sections:

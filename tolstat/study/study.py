@@ -87,8 +87,8 @@ class Study:
         Fit by ISO 286 that gives the diameters.
     assumed : tuple of Assumed
         Assumptions that the study adds to those of its joint, see `assumptions`; they affect no joint.
-    signals : tuple of str
-        Notes on the measured signals that speed or torque follow from, see `signals.replaced`.
+    notes : tuple of str
+        Notes on measured signals that speed or torque follow from, see `signals.replaced`, and on measured joints.
     """
 
     path: Path
@@ -112,7 +112,7 @@ class Study:
     fatigue: Fatigue = field(default_factory=Fatigue)
     fit: Fit | None = None
     assumed: tuple[Assumed, ...] = ()
-    signals: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def mechanism(self) -> Mechanism:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
@@ -144,27 +145,8 @@ def lives_of(view: View) -> Lives:
     view.check()
     bearing, duty, stores = _bearing(view), view.shares_of_time, [part.store for part in view.parts]
     pins = kinds(view.mechanism)["contact"].places
-    loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
-    operation = [recorded.operating_points(store) for store in stores]
-    speeds = np.abs([rows["speed"] for rows in operation])[:, :, None]
-    swings = np.abs(
-        [_misalignments(rows["alpha"], store, len(pins)) for rows, store in zip(operation, stores, strict=True)]
-    )  # (points, rows, pins)
-    critical = bearing.critical_amplitude
-    hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
-    turns = hourly.sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.where(turns > 0.0, hourly / turns, duty[:, None, None])
-        largest = loads.max(axis=0)
-        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
-        load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
-    small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
+    load, hours, small = rated(bearing, duty, [turning_of(store) for store in stores])
     unrated = np.asarray(small[1].all(axis=0))
-    of_pins[unrated] = np.nan
-    whole = rating_life.system_life(of_pins)
-    of_joints = [rating_life.system_life(own) for own in np.split(of_pins, len(view.mechanism.cardan), axis=1)]
-    hours = np.column_stack([of_pins, *(of_joints if view.mechanism.is_shaft else ()), whole])
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
         {name: int(n) for name, n in zip(view.points, (some[:, skip:] & valid).sum(axis=1), strict=True) if n}
@@ -186,13 +168,56 @@ def lives_of(view: View) -> Lives:
     )
 
 
-def _misalignments(first: FloatArray, store: Reader, pins: int) -> FloatArray:
-    """Misalignment of the joint that each pin is of, (rows, pins), rad; `first`: that of joint 1, (rows,)."""
-    joints = first[:, None]
+def turning_of(store: Reader) -> dict[str, FloatArray]:
+    """Equivalent load of each bearing (n, pins), ``omega`` (n,) and ``alpha`` (n, joints) of the joints of a file."""
+    operation = recorded.operating_points(store)
+    loads, alpha = store.results(slice(None), ("equivalent_load",))["equivalent_load"], operation["alpha"][:, None]
     if store.mechanism.is_shaft:
-        second = store.operation.alphas[1] + store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
-        joints = np.column_stack([first, second])
-    return np.asarray(np.repeat(joints, pins // joints.shape[1], axis=1))
+        deviation = store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
+        alpha = np.column_stack([alpha, store.operation.alphas[1] + deviation])
+    return {"equivalent_load": loads, "omega": operation["speed"], "alpha": alpha}
+
+
+def rated(
+    bearing: Bearing, duty: FloatArray, turning: Sequence[Mapping[str, FloatArray]]
+) -> tuple[FloatArray, FloatArray, list[NDArray[np.bool_]]]:
+    """Lives of joints by what they have at each operating point.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        Bearing of each pin.
+    duty : ndarray, shape (points,)
+        Share of the service time at each operating point.
+    turning : sequence of mapping
+        Loads, speeds and misalignments at each operating point, see `turning_of`.
+
+    Returns
+    -------
+    load : ndarray, shape (n, pins)
+        Equivalent load over the duty cycle, N.
+    hours : ndarray, shape (n, places)
+        Life of each bearing, of each joint of a drive shaft, and of the whole, h; NaN without a rating.
+    small : list of ndarray, shape (points, n, pins)
+        Whether a bearing swings by less than its critical amplitude, and by less than `rating_life.FRETTING` of it.
+    """
+    loads = np.stack([each["equivalent_load"] for each in turning])
+    speeds = np.abs([each["omega"] for each in turning])[:, :, None]
+    joints = np.abs([each["alpha"] for each in turning])
+    swings = np.repeat(joints, loads.shape[2] // joints.shape[2], axis=2)
+    critical = bearing.critical_amplitude
+    hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
+    turns = hourly.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turned = np.where(turns > 0.0, hourly / turns, duty[:, None, None])
+        largest = loads.max(axis=0)
+        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
+        load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
+        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
+    small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
+    of_pins[small[1].all(axis=0)] = np.nan
+    of_joints = np.split(of_pins, joints.shape[2], axis=1) if joints.shape[2] > 1 else []
+    return load, np.column_stack([of_pins, *map(rating_life.system_life, (*of_joints, of_pins))]), small
 
 
 def bearing_of(view: View) -> Bearing | None:

@@ -183,7 +183,14 @@ HELP = Campaign(
             "simulate tilted_pin.toml --json",
             "simulate iso2768_f.toml",
         ],
-        "new": ["new first", "new shaft --joint own", "new first", "run first.toml --n 4", "simulate first.toml"],
+        "new": ["new first", "new gear --joint own", "new first", "run first.toml --n 4", "simulate first.toml"],
+        "new_shaft": [
+            "new truck --shaft --size '30.2 x 92'",
+            "new plain --shaft",
+            "new other --shaft --size '30 x 92'",
+            "new other --shaft --joint own",
+            "new other --size '30.2 x 92'",
+        ],
         "spectrum": [
             "new cycle --signal drive_cycle.csv",
             "new other --signal drive_cycle.csv --base iso2768_f.toml --exponent 5",

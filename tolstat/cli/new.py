@@ -1,4 +1,4 @@
-"""``tolstat new``: studies to begin with, one of them from a measured signal."""
+"""``tolstat new``: studies to begin with, of a joint, of a drive shaft, or from a measured signal."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ def new(
     alpha: Annotated[float | None, Opt("ANGLE", least=-RIGHT, most=RIGHT, unit="rad")] = None,
     exponent: Annotated[float | None, Opt("M", least=1.0, most=20.0)] = None,
     base: Annotated[Path | None, Opt("STUDY")] = None,
+    shaft: bool = False,
+    size: Annotated[str | None, Opt("SIZE")] = None,
 ) -> None:
     """Write a study with comments that runs as it stands.
 
@@ -40,6 +42,9 @@ def new(
     Samples are sorted in classes; the 12 classes that do most of the damage, by revolutions and by changes of the
     torque, become operating points with their shares of the time. The order of their visits is written, too, for
     tolstat fatigue. Prints the points; what is left out is told.
+
+    With --shaft, the study is of a drive shaft: two joints, two tubes and a spline. With --size, too, a joint file is
+    written of a cross in the table that comes with tolstat, with its source and what is computed or assumed.
 
     Example: tolstat new shaft --joint own
 
@@ -57,6 +62,10 @@ def new(
         Wöhler exponent of the signal's damage, which is proportional to the torque to this power; default: 3.
     base : Path, optional
         Study file (TOML) whose operating points those of the signal replace; default: the study of tolstat new.
+    shaft : bool
+        Study of a drive shaft of two joints.
+    size : str, optional
+        Size of the crosses of a drive shaft, cup x length over two cups in mm: "27 x 81.8"; another one lists all.
     """
     path = name if name.suffix.lower() == ".toml" else name.with_name(f"{name.name}.toml")
     faults: list[Fault] = []
@@ -66,12 +75,20 @@ def new(
         faults.append(Fault("--alpha, --base, --exponent", "are about a measured signal", "give it, too: --signal CSV"))
     if signal is not None and joint is not None:
         faults.append(Fault("--joint", "cannot be used together with --signal", "name a study with the joint: --base"))
+    if shaft and (signal is not None or joint is not None):
+        given = " and ".join(f"--{name}" for name, value in (("joint", joint), ("signal", signal)) if value is not None)
+        remedy = "name the joint or the signal in the study that it writes"
+        faults.append(Fault("--shaft", f"cannot be used together with {given}", remedy))
+    if size is not None and not shaft:
+        faults.append(Fault("--size", "is the size of the crosses of a drive shaft", "give --shaft, too"))
     if signal is not None and path.exists():
         faults.append(Fault(str(path), "exists", "give the study another name"))
     with gather(faults):
         check_target(path)
     raise_all(faults)
-    if signal is None:
+    if shaft:
+        files = starter.write_shaft(path, size)
+    elif signal is None:
         files = starter.write(path, joint or "cirelli2021")
     else:
         files = [_write_cycle(path, signal, alpha, exponent or EXPONENT, base)]

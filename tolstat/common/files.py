@@ -1,7 +1,8 @@
-"""Directory of the package's data, reading of input files, and atomic writing of files."""
+"""Directory and tables of the package's data, reading of input files, and atomic writing of files."""
 
 from __future__ import annotations
 
+import csv
 import errno
 import os
 import re
@@ -24,6 +25,12 @@ WIDE = 64
 def data_dir() -> Path:
     """Directory of the data that comes with the package."""
     return _delivered("data")
+
+
+def data_rows(name: str) -> list[dict[str, str]]:
+    """Rows of a table (CSV) of the data folder, below its comments: column to text."""
+    with (data_dir() / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def docs_dir() -> Path:

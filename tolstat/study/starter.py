@@ -1,4 +1,4 @@
-"""A new study with comments that runs as it stands, its schema for editors, and a joint of one's own."""
+"""A new study with comments that runs as it stands, of a joint or a drive shaft, schemas for editors, and a joint."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import json
 import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, input_error, raise_all
 from tolstat.common.files import atomic_write, data_dir
-from tolstat.study import rewriting
+from tolstat.study import cross_sizes, rewriting
 from tolstat.study.schema import KINDS, schema
 
 HEADER = "#:schema ./{}.schema.json\n"
@@ -23,6 +24,8 @@ WIDTH = 100
 LIMITS = {OWN: ("2500 N", "60 N*m")}
 """Limits on force and torque of cross bushings that a few per cent of the joints exceed; `LIMIT` for others."""
 LIMIT = ("850 N", "36 N*m")
+SHAFT_JOINT = ("pin25", 600.0, 107.0, 7.0)
+"""Joint of a drive shaft without a size: its name, torque (N m), length over two cups (mm), force on a pin (kN)."""
 
 
 def write(path: Path, joint: str) -> list[Path]:
@@ -48,7 +51,49 @@ def write(path: Path, joint: str) -> list[Path]:
     names = sorted(file.stem for file in (data_dir() / "joints").glob("*.toml"))
     if joint not in (*names, OWN):
         raise input_error("--joint", f"no joint is named {joint!r}", strict.did_you_mean(joint, [*names, OWN]))
-    files = dict(_files(path, joint))
+    base = _beside(path) if joint == OWN else joint
+    return _write(path, study_text(path, base, LIMITS.get(joint, LIMIT)), joint_text() if joint == OWN else None)
+
+
+def write_shaft(path: Path, size: str | None) -> list[Path]:
+    """Write the study of a drive shaft, and the file of its joints if their size is given, with the schemas of both.
+
+    Parameters
+    ----------
+    path : Path
+        The study; its folder is made.
+    size : str, optional
+        Size of the crosses in the table of `cross_sizes`; without it the joints are `SHAFT_JOINT`.
+
+    Returns
+    -------
+    list of Path
+        The files, the study first.
+
+    Raises
+    ------
+    InputError
+        When there is no such size, a file exists, or cannot be written.
+    """
+    if size is None:
+        return _write(path, _shaft_text(path, *SHAFT_JOINT), None)
+    row = cross_sizes.cross(size)
+    study = _shaft_text(path, _beside(path), row.torque_Nm, row.length_mm, row.pin_force_kN)
+    return _write(path, study, joint_text("cross.toml", row.words()))
+
+
+def _beside(path: Path) -> str:
+    """Name of the joint file that is written with a study."""
+    return f"{path.stem}_joint.toml"
+
+
+def _write(path: Path, study: str, joint: str | None) -> list[Path]:
+    """Write a study, a joint file beside it if there is one, and their schemas; returns the files."""
+    files = {path: HEADER.format("study") + study}
+    if joint is not None:
+        files[path.with_name(_beside(path))] = HEADER.format("joint") + joint
+    for kind in ("study", "joint")[: len(files)]:
+        files[path.with_name(f"{kind}.schema.json")] = json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"
     taken = [file for file in files if file.exists() and not _made(file)]
     raise_all(Fault(str(file), "exists", "give the study another name") for file in taken)
     try:
@@ -62,23 +107,29 @@ def write(path: Path, joint: str) -> list[Path]:
     return list(files)
 
 
-def _files(path: Path, joint: str) -> Iterator[tuple[Path, str]]:
-    base = f"{path.stem}_joint.toml" if joint == OWN else joint
-    yield path, HEADER.format("study") + study_text(path, base, LIMITS.get(joint, LIMIT))
-    if joint == OWN:
-        text = "# The joint as designed. Keys behind a # may be left out; their values are those of another joint.\n"
-        yield path.with_name(base), HEADER.format("joint") + text + joint_text()
-    for kind in ("study", "joint") if joint == OWN else ("study",):
-        yield path.with_name(f"{kind}.schema.json"), json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"
-
-
 def study_text(path: Path, base: str, limits: tuple[str, str] = LIMIT) -> str:
     """Study with comments, of a name, on the joint `base`, with limits on force and torque of cross bushings."""
-    study = (TEMPLATES / "study.toml").read_text(encoding="utf-8")
-    words = {"JOINT": base, "FORCE": limits[0], "TORQUE": limits[1]}
-    for word, value in (words | {"STUDY.toml": path.name, "STUDY.h5": f"{path.stem}.h5"}).items():
-        study = study.replace(word, value)
-    return study
+    return _filled("study.toml", path, joint=base, force=limits[0], torque=limits[1])
+
+
+def _shaft_text(path: Path, base: str, torque: float, length: float, pin_force: float) -> str:
+    """Study of a drive shaft of a rated torque (N m), which presses on a pin (kN), and length over two cups (mm)."""
+    numbers = {
+        "cruise": 0.3 * torque,
+        "climb": 0.6 * torque,
+        "start": torque,
+        "tube": 0.9 * length,
+        "spline": 0.45 * length,
+        "bearing": 1.5 * torque + 200.0,  # limits that a few per cent of the shafts exceed
+        "pin_force": 1.05 * pin_force,
+    }
+    return _filled("shaft.toml", path, joint=base, **{name: f"{float(f'{x:.3g}'):g}" for name, x in numbers.items()})
+
+
+def _filled(template: str, path: Path, **words: str) -> str:
+    """Text of the template of a study of a name, with words put in."""
+    text = Template((TEMPLATES / template).read_text(encoding="utf-8"))
+    return text.substitute(words, study=path.name, results=f"{path.stem}.h5")
 
 
 def _made(path: Path) -> bool:
@@ -90,11 +141,15 @@ def _made(path: Path) -> bool:
     return title in [schema(kind)["title"] for kind in KINDS]
 
 
-def joint_text() -> str:
-    """Joint file with all keys, those that are optional as comments, and what each means; then what is assumed."""
-    template = TEMPLATES / "joint.toml"
-    keys, *assumed = strict.read_text(template).partition("# What is assumed")
-    return "\n".join(_table(schema("joint"), strict.read_toml(template, keys))) + "\n\n" + "".join(assumed)
+def joint_text(template: str = "joint.toml", words: Mapping[str, str] | None = None) -> str:
+    """Joint file of a template: all keys, those that are optional as comments, and what each means; what is assumed.
+
+    `words` are put into the template; its comments before the first key are kept.
+    """
+    path = TEMPLATES / template
+    head, first, rest = Template(strict.read_text(path)).substitute(words or {}).partition("description = ")
+    keys, *assumed = (first + rest).partition("# What is assumed")
+    return head + "\n".join(_table(schema("joint"), strict.read_toml(path, keys))) + "\n\n" + "".join(assumed)
 
 
 def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -> Iterator[str]:

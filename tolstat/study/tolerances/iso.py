@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from functools import cache
 from typing import NamedTuple
 
-from tolstat.common.files import data_dir
+from tolstat.common.files import data_rows
 
 GRADES, DEVIATIONS = "iso286_grades.csv", "iso286_deviations.csv"
 """Files of the data folder."""
@@ -134,15 +133,10 @@ def _row(name: str, size: float) -> dict[str, float]:
     return next(row for row in table(name) if size <= row["up_to_mm"] * (1 + 1e-12))
 
 
-def _rows(name: str) -> list[dict[str, str]]:
-    with (data_dir() / name).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
-
-
 @cache
 def table(name: str) -> tuple[dict[str, float], ...]:
     """Read a table of the data folder: rows by ascending size, numbers by column (mm, um)."""
-    return tuple({column: float(text) for column, text in row.items()} for row in _rows(name))
+    return tuple({column: float(text) for column, text in row.items()} for row in data_rows(name))
 
 
 @cache
@@ -151,7 +145,7 @@ def ranges(kind: str, grade: str) -> list[tuple[float, float, float]]:
     factor = {"mm": 1e-3, "arcmin": math.radians(1 / 60)}
     return [
         (float(row["over_mm"]), float(row["up_to_mm"]), float(row["deviation"]) * factor[row["unit"]])
-        for row in _rows("iso2768.csv")
+        for row in data_rows("iso2768.csv")
         if (row["kind"], row["class"]) == (kind, grade)
     ]
 

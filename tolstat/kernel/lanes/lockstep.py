@@ -40,7 +40,7 @@ from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactor
 from tolstat.kernel.mechanics.dynamics import residual
 from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
-from tolstat.kernel.revolution.closeup import divide, on_a_peak, recall, switches
+from tolstat.kernel.revolution.closeup import divide, on_a_peak, recall, reverses, switches
 from tolstat.kernel.revolution.outcome import (
     clear_results,
     clear_samples,
@@ -137,7 +137,8 @@ def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
         switched = k < n and switches(k, samples)
-        rings = k < n and (switched or looking) and on_a_peak(k, par, samples, out)
+        begins = switched or looking or (k < n and reverses(k, samples))
+        rings = k < n and begins and on_a_peak(k, par, samples, out)
         if rings and not looking:
             forget_steps(lane, control, batch.motion)
             recall(k - 1, lane, par, options, samples, batch.motion)

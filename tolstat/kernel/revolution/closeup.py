@@ -1,10 +1,10 @@
-"""Closer look: finer integration of load peaks at which a contact switches.
+"""Closer look: finer integration of load peaks at which a contact switches, or sliding reverses.
 
-When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
-and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
-steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as a load rings near
-its largest value. The trapezoidal rule takes them in place of BDF2, which damps the ringing, if the parts resolve it.
-They count among the largest and smallest loads; the recorded samples stay as they are.
+When a contact or a face opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the
+ringing, and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load.
+There the steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as a load
+rings near its largest value. The trapezoidal rule takes them in place of BDF2, which damps the ringing, if the parts
+resolve it. They count among the largest and smallest loads; the recorded samples stay as they are.
 """
 
 import math
@@ -35,11 +35,20 @@ the trapezoidal rule takes: they are so short that it takes off all but a hundre
 
 @njit
 def switches(s, samples):
-    """Whether any contact station opened or closed between samples `s - 1` and `s`."""
+    """Whether a contact station or a face opened or closed between samples `s - 1` and `s`."""
     switched = False
     for pin in range(samples[s].pressed.shape[0]):
         switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
     return switched
+
+
+@njit
+def reverses(s, samples):
+    """Whether a contact station began or ceased to stick between samples `s - 1` and `s`: sliding reverses there."""
+    changed = False
+    for pin in range(samples[s].stuck.shape[0]):
+        changed |= samples[s].stuck[pin] != samples[s - 1].stuck[pin]
+    return changed
 
 
 @njit

@@ -273,6 +273,12 @@ def third_differences_of_loads(s, samples):
 
 
 @njit
+def is_sharp(par):
+    """Whether a joint has thrust faces or friction: its forces change within a step where one sets in."""
+    return par.friction == 1 or par.face_pair.shape[0] > 0
+
+
+@njit
 def step_error(par, samples):
     """Estimated error of a BDF2 step, as a load relative to the largest one: mean over the recorded revolution.
 
@@ -280,7 +286,7 @@ def step_error(par, samples):
     stiffness of the lump's bushing converts it to a load. Of a joint with faces or friction third differences of the
     bushing loads themselves count: where sliding reverses its cross moves far without load.
     """
-    by_loads = par.friction == 1 or par.face_pair.shape[0] > 0
+    by_loads = is_sharp(par)
     force = torque = 0.0
     for s in range(samples.size):
         force = max(force, size_of(OF_FORCES, samples[s].loads, par))

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from tests.support.environment import ROOT
+from tests.support.held import FACES, FRICTION, held
 from tests.support.of_cardan import LOAD_KINDS, RESULT
 from tolstat import joint, sampling, study
 from tolstat.campaign.remedy import remedy
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import measure_of
-from tolstat.common.tables import Method, Options, Status
+from tolstat.common.tables import Method, Options, Status, tables
 from tolstat.kernel.lanes.batch import make_batch
-from tolstat.kernel.revolution.closeup import STEPS, divide
+from tolstat.kernel.revolution.closeup import STEPS, divide, reverses, switches
+from tolstat.kernel.revolution.settle import make_samples
 from tolstat.solver import refinement
 from tolstat.solver.simulation import simulate_rows
 
@@ -197,6 +202,34 @@ def test_with_fewer_steps_larger_errors_are_allowed_as_the_third_power_of_the_st
     results["step_error"] = factor * np.repeat(allowed, 2) * np.array([0.99, 1.01, 0.99, 1.01])
     refinement.refine(results, Options(steps_per_rev=steps), simulate)
     assert asked == [1, 3]
+
+
+@pytest.mark.parametrize("sections", [{"thrust": FACES}, {"friction": FRICTION}])
+def test_joints_with_faces_or_friction_get_finer_steps_first(sections: dict) -> None:
+    """Whatever |Psi|: three joints of which one errs too little to be refined, one by too much in finer steps, too."""
+    mechanism, asked = held(**sections)[1], []
+    results = np.zeros(3, tables(mechanism).RESULT)
+    results["status"], results["psi_max"] = Status.OK, 2 * refinement.SWINGING_PSI
+    results["step_error"] = np.array([0.99, 1.01, 1.01]) * refinement.SHARP_STEP_ERROR
+
+    def simulate(rows: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
+        asked.append((rows.tolist(), options.method, options.steps_per_rev, options.peak_substeps))
+        made = results[rows]
+        made["step_error"][rows == 1] = 0.99 * refinement.SHARP_STEP_ERROR
+        made["steps_per_rev"] = options.steps_per_rev
+        return made, np.zeros((len(rows), 48), results.dtype)
+
+    refinement.refine(results, Options(), simulate, mechanism)
+    assert asked == [([1, 2], Method.BDF2, 720, 20), ([2], Method.TR_BDF2, 180, 40)]
+    assert results["steps_per_rev"].tolist() == [0, 720, 180]
+
+
+@pytest.mark.parametrize(("field", "begins"), [("pressed", switches), ("stuck", reverses)])
+def test_a_closer_look_begins_where_a_contact_switches_or_sliding_reverses(field: str, begins: Callable) -> None:
+    samples = make_samples(1, 6, CARDAN)[0]
+    samples[field] = 0
+    samples[field][3:5, 2] = 1 << 3
+    assert [s for s in range(1, 6) if begins(s, samples)] == [3, 5]
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,13 @@ SWINGING_PSI, SWINGING_STEP_ERROR = 1.5e-3, 1e-3
 """|Psi| above which the output shaft swings about the ideal motion, and the mean error above which such a joint is
 refined: errors of a swinging motion decay slowly, and BDF2 damps it. Both numbers come from 2759 joints that were
 solved both ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the worst is 0.8 % off."""
+SHARP_STEP_ERROR = 1.5e-3
+"""Mean error above which a joint with faces or friction is refined: it is one of loads (`kernel.revolution.settle`)."""
 FINER = 4
 """Times as many uniform steps that joints with faces or friction get before error-controlled ones: where sliding
 reverses or a face is reached they give the same accuracy in a quarter of the time (docs/notes/steps.md)."""
+FEWER_PARTS = 2
+"""Factor by which these steps have fewer parts in a closer look."""
 MAX_CHANGE = 0.05
 """Change of the largest loads by the last halving of the steps above which a joint is not resolved. A method of order 2
 leaves a third of it as error, or less."""
@@ -81,9 +85,11 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate, mech
     if not may_refine(options):
         return
     coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 3
-    allowed = np.where(results["psi_max"] > SWINGING_PSI, SWINGING_STEP_ERROR, STEP_ERROR) * coarse
+    sharp = bool(mechanism.faces) or mechanism.friction
+    swinging = np.where(results["psi_max"] > SWINGING_PSI, SWINGING_STEP_ERROR, STEP_ERROR)
+    allowed = np.where(sharp, SHARP_STEP_ERROR, swinging) * coarse
     unsure = (results["status"] == Status.OK) & (results["step_error"] > allowed)
-    if mechanism.faces or mechanism.friction:
+    if sharp:
         unsure[_with_finer_steps(np.flatnonzero(unsure), results, options, simulate)] = False
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:
@@ -115,12 +121,14 @@ def _with_finer_steps(
     """
     if not rows.size:
         return rows
-    finer = options._replace(steps_per_rev=FINER * options.steps_per_rev)
+    finer = options._replace(
+        steps_per_rev=FINER * options.steps_per_rev, peak_substeps=max(1, options.peak_substeps // FEWER_PARTS)
+    )
     found, _ = simulate(rows, finer)
     for name in COUNTS:
         found[name] += results[name][rows]
         results[name][rows] = found[name]
-    good = (found["status"] == Status.OK) & (found["step_error"] <= STEP_ERROR)
+    good = (found["status"] == Status.OK) & (found["step_error"] <= SHARP_STEP_ERROR)
     results[rows[good]] = found[good]
     return np.asarray(rows[good])
 

@@ -36,6 +36,10 @@ MOST_ALONE = 3
 UNIFORM_REVS = 4
 """Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
+LOOSER = 2.0
+"""Factor on ``newton_tol`` of joints with faces or friction: their loads err by more than that leaves. With a larger
+one joints settle later."""
+
 
 @cache
 def lanes(options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
@@ -95,6 +99,8 @@ def simulate_rows(
     """
     if options.fidelity == Fidelity.IDEAL:
         ideal.check(params)
+    if mechanism.faces or mechanism.friction:
+        options = options._replace(newton_tol=LOOSER * options.newton_tol)
     specs = history_specs(options, histories, n_harmonics, mechanism)
     recorded = {name: spec.blank(len(params)) for name, spec in specs.items()}
     allowed = tables.iterations_allowed(options.steps_per_rev, options.max_revs)

@@ -39,8 +39,8 @@ from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactorise
 from tolstat.kernel.mechanics.dynamics import residual
 from tolstat.kernel.mechanics.loads import complete_loads, write_loads
+from tolstat.kernel.revolution.closeup import KINK, SHARP_KINK, divide, on_a_peak, recall, reverses, switches
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
-from tolstat.kernel.revolution.closeup import divide, on_a_peak, recall, switches
 from tolstat.kernel.revolution.outcome import (
     clear_results,
     clear_samples,
@@ -137,7 +137,9 @@ def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
         switched = k < n and switches(k, samples)
-        rings = k < n and (switched or looking) and on_a_peak(k, par, samples, out)
+        goes_on = switched or looking
+        begins = goes_on or (k < n and reverses(k, samples))
+        rings = k < n and begins and on_a_peak(k, KINK if goes_on else SHARP_KINK, par, samples, out)
         if rings and not looking:
             forget_steps(lane, control, batch.motion)
             recall(k - 1, lane, par, options, samples, batch.motion)

@@ -1,10 +1,10 @@
-"""Closer look: finer integration of load peaks at which a contact switches.
+"""Closer look: finer integration of load peaks at which a contact switches, or sliding reverses.
 
-When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
-and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
-steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as a load rings near
-its largest value. The trapezoidal rule takes them in place of BDF2, which damps the ringing, if the parts resolve it.
-They count among the largest and smallest loads; the recorded samples stay as they are.
+When a contact or a face opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the
+ringing, and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load.
+There the steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as a load
+rings near its largest value. The trapezoidal rule takes them in place of BDF2, which damps the ringing, if the parts
+resolve it. They count among the largest and smallest loads; the recorded samples stay as they are.
 """
 
 import math
@@ -13,16 +13,20 @@ from tolstat.kernel.codes import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.loads import size_of
 from tolstat.kernel.mechanics.scale import stiffness
-from tolstat.kernel.revolution.settle import grid_step, peak
+from tolstat.kernel.revolution.settle import grid_step, is_sharp, peak
 from tolstat.kernel.simd.jit import njit
 
 KINK = 2e-4
 """Third difference of a load's samples, in units of its measure, up to which ringing is too weak to count."""
+SHARP_KINK = 1e-3
+"""The same where only sliding reverses: a smaller kink does not ring, but the trapezoidal rule would make it ring."""
 REACH = 7.0
 """Distance of a load from its largest value, in units of the third difference of its samples, that ringing may
 bridge."""
 STEPS = 2
 """Least number of steps of the grid that are integrated again: the one in which the contact switches, and the next."""
+MORE = 2
+"""Factor by which the first step has more parts with faces or friction: a hit lasts a tenth of a degree."""
 FEWER = 4
 """Factor by which later steps have fewer parts: the ringing has decayed by then."""
 LONGEST = 4 * math.pi
@@ -35,7 +39,7 @@ the trapezoidal rule takes: they are so short that it takes off all but a hundre
 
 @njit
 def switches(s, samples):
-    """Whether any contact station opened or closed between samples `s - 1` and `s`."""
+    """Whether a contact station or a face opened or closed between samples `s - 1` and `s`."""
     switched = False
     for pin in range(samples[s].pressed.shape[0]):
         switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
@@ -43,8 +47,20 @@ def switches(s, samples):
 
 
 @njit
-def on_a_peak(s, par, samples, out):
-    """Whether a load that decides has a kink about samples `s - 1` and `s` and is near its largest value there."""
+def reverses(s, samples):
+    """Whether a contact station began or ceased to stick between samples `s - 1` and `s`: sliding reverses there."""
+    changed = False
+    for pin in range(samples[s].stuck.shape[0]):
+        changed |= samples[s].stuck[pin] != samples[s - 1].stuck[pin]
+    return changed
+
+
+@njit
+def on_a_peak(s, least, par, samples, out):
+    """Whether a load that decides has a kink about samples `s - 1` and `s` and is near its largest value there.
+
+    `least`: third difference above which there is a kink, as `KINK`.
+    """
     n = samples.size
     for measure in range(par.of_measure.shape[0]):
         size = size_of(measure, out.largest, par)
@@ -53,7 +69,7 @@ def on_a_peak(s, par, samples, out):
             m0, m1 = samples[s - 2].loads[i], samples[s - 1].loads[i]
             m2, m3, m4 = samples[s].loads[i], samples[(s + 1) % n].loads[i], samples[(s + 2) % n].loads[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
-            if kink > KINK * size and max(m1, m2, m3) > out.largest[i] - REACH * kink:
+            if kink > least * size and max(m1, m2, m3) > out.largest[i] - REACH * kink:
                 return True
     return False
 
@@ -109,6 +125,8 @@ def divide(lane, par, options, control, motion):
     h, parts = grid_step(par, options), options.peak_substeps
     if control.left[lane] <= 0:
         parts = max(1, parts // FEWER)
+    elif control.left[lane] == STEPS and is_sharp(par):
+        parts *= MORE
     pin = par.pin[0]
     resolved = h / parts <= LONGEST * math.sqrt(mass_of(pin, par)[0] / stiffness(pin, par)[0])
     control.until[lane], control.grid[lane] = parts, h / parts

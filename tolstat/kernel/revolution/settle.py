@@ -12,7 +12,7 @@ from tolstat.kernel.mechanics.dynamics import forces
 from tolstat.kernel.mechanics.loads import LOSS, OF_FORCES, OF_TORQUES, complete_loads, size_of, write_loads
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.vector import larger
-from tolstat.kernel.mechanics.work import FORCE
+from tolstat.kernel.mechanics.work import DAMPING, FORCE, SLOPE
 from tolstat.kernel.revolution.bearing import write_bearings, write_equivalent_loads
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.simd.borrow import fetch
@@ -39,7 +39,8 @@ def sample_dtype(mechanism):
             ("psi", "f8"),  # its error, eq. (13)
             ("loss", "f8", (pins if mechanism.friction else 0,)),  # power of each pin's friction, W
             ("mode", "u1", (pins,)),
-            ("pressed", "u2", (pins,)),  # bit j: station j of the pin carries a force
+            ("pressed", "u4", (pins,)),  # bit j: station j of the pin carries a force; the next bit: its face
+            ("stuck", "u2", (pins,)),  # bit j: station j sticks
             ("q", "f8", (mechanism.dof,)),  # m, rad
             ("v", "f8", (mechanism.dof,)),  # per s
         ],
@@ -47,6 +48,9 @@ def sample_dtype(mechanism):
     )
 
 
+STICKS = 0.5
+"""Slope of friction along the sliding, relative to that across it, above which a station sticks: it slides with less
+than the slip speed."""
 BUSHINGS_ONLY, ALL_LOADS = 0, 1
 """Columns of its ``change``: bushing loads, and s as a force; with them what the shafts carry."""
 
@@ -69,11 +73,26 @@ def grid_step(par, options):
 
 @njit
 def pressed(pin, lane, par, work):
-    """Which stations of `pin` carry a force, as bits."""
+    """Which stations of `pin` carry a force, and whether a face does, as bits."""
     bits = 0
     for j in range(par.n_stations):
         if pick(work.station[pin, j, FORCE], lane) > 0:
             bits |= 1 << j
+    for face in range(par.face_pair.shape[0]):
+        if par.face_pair[face] == pin and pick(work.face[face, FORCE], lane) > 0:
+            bits |= 1 << par.n_stations
+    return bits
+
+
+@njit
+def stuck(pin, lane, par, work):
+    """Which stations of `pin` stick, as bits."""
+    bits = 0
+    if par.friction == 1:
+        for j in range(par.n_stations):
+            rubbing = work.rubbing[pin, j]
+            if pick(rubbing[SLOPE], lane) > STICKS * pick(rubbing[DAMPING], lane):
+                bits |= 1 << j
     return bits
 
 
@@ -130,7 +149,7 @@ def record(k, lane, par, work, samples):
         sample.loss[pin] = pick(work.loss[pin], lane)
     for pin in range(work.mode.shape[0]):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
-        sample.pressed[pin] = pressed(pin, lane, par, work)
+        sample.pressed[pin], sample.stuck[pin] = pressed(pin, lane, par, work), stuck(pin, lane, par, work)
 
 
 @njit
@@ -238,12 +257,36 @@ def third_differences(s, body, samples):
 
 
 @njit
+def third_differences_of_loads(s, samples):
+    """Largest third differences at sample `s` of a component of a bushing's force (N) and torque (N m)."""
+    c0, c1 = samples[s - 3].components, samples[s - 2].components
+    c2, c3 = samples[s - 1].components, samples[s].components
+    force = torque = 0.0
+    for bushing in range(c0.shape[0]):
+        for i in range(6):
+            third = abs(c3[bushing, i] - c0[bushing, i] - 3 * (c2[bushing, i] - c1[bushing, i]))
+            if i < 3:
+                force = max(force, third)
+            else:
+                torque = max(torque, third)
+    return force, torque
+
+
+@njit
+def is_sharp(par):
+    """Whether a joint has thrust faces or friction: its forces change within a step where one sets in."""
+    return par.friction == 1 or par.face_pair.shape[0] > 0
+
+
+@njit
 def step_error(par, samples):
     """Estimated error of a BDF2 step, as a load relative to the largest one: mean over the recorded revolution.
 
     A step of BDF2 errs by 2/9 of the third difference of an unknown (Hairer, Wanner: Solving ODEs I, III.2); the
-    stiffness of the lump's bushing converts it to a load.
+    stiffness of the lump's bushing converts it to a load. Of a joint with faces or friction third differences of the
+    bushing loads themselves count: where sliding reverses its cross moves far without load.
     """
+    by_loads = is_sharp(par)
     force = torque = 0.0
     for s in range(samples.size):
         force = max(force, size_of(OF_FORCES, samples[s].loads, par))
@@ -251,10 +294,13 @@ def step_error(par, samples):
     total = 0.0
     for s in range(samples.size):
         by_shift = by_turn = 0.0
-        for body in range(par.lump_kind.shape[0]):
-            k, k_turn = stiffness(body, par)
-            shift, turn = third_differences(s, body, samples)
-            by_shift, by_turn = max(by_shift, k * shift), max(by_turn, k_turn * turn)
+        if by_loads:
+            by_shift, by_turn = third_differences_of_loads(s, samples)
+        else:
+            for body in range(par.lump_kind.shape[0]):
+                k, k_turn = stiffness(body, par)
+                shift, turn = third_differences(s, body, samples)
+                by_shift, by_turn = max(by_shift, k * shift), max(by_turn, k_turn * turn)
         total += max(by_shift / force, by_turn / torque)
     return 2 / 9 * total / samples.size
 

@@ -105,7 +105,8 @@ class Code:
         if definition.attr in numbers:
             array = numbers[definition.attr]
             return array.shape, set(array.ravel().tolist())
-        return getattr(record.typeof(definition.attr), "shape", ()), set()
+        field = record.fields.get(definition.attr)  # None: an error that Numba reports
+        return getattr(field and field.type, "shape", ()), set()
 
 
 def _is(definition, op):

@@ -104,7 +104,7 @@ def test_two_kernels_of_one_factory_are_told_apart():
 @njit_inner
 def of_general_hinges(par, hinge):
     if par.hinge_axis[hinge] == GENERAL:
-        return par.no_such_field
+        return par.omega.no_such_field
     return par.omega
 
 
@@ -112,7 +112,7 @@ def of_general_hinges(par, hinge):
 def of_faces(par):
     total = 0.0
     for face in range(par.face_pair.shape[0]):
-        total += par.no_such_field[face]
+        total += par.omega.no_such_field[face]
     return total
 
 

@@ -11,6 +11,10 @@ import numpy as np
 import pytest
 from numba import float64
 
+from tests.support.linkages import mechanism_of
+from tolstat.common.cardan import CARDAN, MECHANISMS
+from tolstat.common.mechanism import GENERAL, numbering
+from tolstat.common.tables import blank_params
 from tolstat.kernel.simd.jit import njit_inner
 
 
@@ -95,6 +99,52 @@ def test_two_kernels_of_one_factory_are_told_apart():
 
     assert both(3.0) == (10.0, 28.0)
     assert (of_square(2.0), of_cube(2.0)) == (5.0, 9.0)
+
+
+@njit_inner
+def of_general_hinges(par, hinge):
+    if par.hinge_axis[hinge] == GENERAL:
+        return par.omega.no_such_field
+    return par.omega
+
+
+@njit_inner
+def of_faces(par):
+    total = 0.0
+    for face in range(par.face_pair.shape[0]):
+        total += par.omega.no_such_field[face]
+    return total
+
+
+@njit_inner
+def shafts_that_slide(par):
+    count = 0
+    for shaft in range(par.slide.shape[0]):
+        if par.slide[shaft] >= 0:
+            count += 1
+    return count
+
+
+def first_joint(mechanism):
+    return blank_params(1, mechanism).view(np.recarray)[0]
+
+
+def test_code_for_parts_that_a_mechanism_does_not_have_is_left_out():
+    assert of_general_hinges(first_joint(CARDAN), 0) == 0.0
+    assert of_faces(first_joint(CARDAN)) == 0.0
+
+
+def test_code_for_parts_that_a_mechanism_has_stays():
+    with pytest.raises(numba.TypingError, match="no_such_field"):
+        of_general_hinges(first_joint(mechanism_of("bennett")), 0)
+    with pytest.raises(numba.TypingError, match="no_such_field"):
+        of_faces(first_joint(MECHANISMS["cardan+thrust"]))
+
+
+def test_conditions_with_two_outcomes_stay():
+    slides = numbering(CARDAN)["slide"] >= 0
+    assert 0 < slides.sum() < slides.size
+    assert shafts_that_slide(first_joint(CARDAN)) == slides.sum()
 
 
 def test_an_error_in_a_part_names_it():

@@ -12,7 +12,8 @@ from numba.core.datamodel import models
 from numba.extending import intrinsic, lower_getattr, overload, register_model
 
 from tolstat.common.cardan import CARDAN
-from tolstat.common.parameters import NUMBERS, numbers
+from tolstat.common.parameters import numbers
+from tolstat.kernel.simd.absent import numbers_of
 from tolstat.kernel.simd.lane import LANE, SINGLE, WIDTH
 
 ALIGNMENT = 8 * WIDTH
@@ -48,7 +49,7 @@ class LaneRecordModel(models.RecordModel):
 def record_of_lanes(record):
     """Numba type of a record whose float fields are lanes; `record` is the type of the NumPy record."""
     fields, lanes_of = [], {types.float64: LANE, types.float32: SINGLE}
-    constants = next((NUMBERS[name] for name in record.fields if name in NUMBERS), {})
+    constants = numbers_of(record)
     for name, field in record.fields.items():
         if name in constants:
             continue

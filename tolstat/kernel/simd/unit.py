@@ -15,7 +15,9 @@ from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import AnnotateTypes, NativeLowering, NopythonRewrites
 from numba.core.types import Dispatcher, unliteral
-from numba.core.untyped_passes import InlineClosureLikes
+from numba.core.untyped_passes import InlineClosureLikes, RewriteSemanticConstants
+
+from tolstat.kernel.simd.absent import DecideConditions
 
 
 class Unit(JITCodeLibrary):
@@ -102,6 +104,7 @@ class Whole(Compiler):
         """Numba's pipeline, lowering into a `Unit`."""
         (passes,) = super().define_pipelines()
         passes.passes = [one for one in passes.passes if one[0] not in UNUSED]
+        passes.add_pass_after(DecideConditions, RewriteSemanticConstants)
         passes.add_pass_after(IntoUnit, AnnotateTypes)
         passes.finalize()
         return [passes]

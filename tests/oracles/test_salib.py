@@ -19,7 +19,8 @@ def test_indices_of_saltellis_design(n):
     """Total indices agree to 1e-12. First-order ones do, too, once the same mean is subtracted from the loads.
 
     SALib subtracts the mean of all joints, we that of A and B: the estimates themselves agree to 3e-4. Half widths of
-    ours are 1.17 to 1.27 times those of SALib's bootstrap: the factor `WIDER`, 1.2.
+    ours are 1.17 to 1.27 times those of SALib's bootstrap: the factor `WIDER`, 1.2; where they end at 0 or 1 they say
+    nothing.
     """
     loads = ishigami(saltelli.sample(PROBLEM, n, calc_second_order=False, seed=1))
     theirs = sobol.analyze(PROBLEM, loads, calc_second_order=False, num_resamples=2000, seed=1)
@@ -31,7 +32,9 @@ def test_indices_of_saltellis_design(n):
     np.testing.assert_allclose(centred, theirs["S1"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.first.estimate, theirs["S1"], rtol=0, atol=4e-4)
     for index, half in ((found.first, theirs["S1_conf"]), (found.total, theirs["ST_conf"])):
-        ratio = 0.5 * (index.upper - index.lower) / half
+        whole = (index.lower > 0.0) & (index.upper < 1.0)
+        assert whole.any()
+        ratio = (0.5 * (index.upper - index.lower) / half)[whole]
         assert ratio.min() > 1.1
         assert ratio.max() < 1.35
 

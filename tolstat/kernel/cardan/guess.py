@@ -142,7 +142,7 @@ def slides(member, par):
 
 @njit
 def move(member, u, phi, par, q):
-    """Displace all bodies of a member by `u` (m) and turn them about its origin by `phi` (rad), in the unknowns `q`."""
+    """Displace all bodies of `member` by `u` (m) and turn them about its origin by `phi` (rad), in the unknowns `q`."""
     lumps = par.lump_kind.shape[0]
     for body in range(lumps):
         if par.frame[body] == member:

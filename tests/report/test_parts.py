@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.environment import ROOT
 from tolstat.campaign.run import run
 from tolstat.cli.simulate import evaluate, simulate
 from tolstat.common.cardan import CARDAN
@@ -110,6 +111,21 @@ def test_the_life_of_a_bearing_by_hand(tmp_path: Path) -> None:
     assert list(found) == [*(f"life of pin{i}" for i in (1, 2, 3, 4)), "life of all four"]
     assert found["life of pin1"] == pytest.approx(LIFE)
     assert found["life of all four"] == pytest.approx(LIFE * 4 ** (-8 / 9))
+
+
+def test_a_drive_shaft_has_lives_of_its_joints_and_of_the_whole() -> None:
+    study = load(ROOT / "studies" / "shaft.toml")
+    turning = {"equivalent_load": np.full((2, 8), 6000.0), "omega": np.full(2, 157.0), "alpha": np.full((2, 2), 0.3)}
+    found = lives(study, turning)
+    assert list(found)[7:] == [
+        "life of joint2.pin4",
+        "life of all of joint1",
+        "life of all of joint2",
+        "life of all eight",
+    ]
+    of_pin = found["life of joint1.pin1"]
+    assert found["life of all of joint1"] == pytest.approx(4 ** (-8 / 9) * of_pin, rel=1e-12)
+    assert found["life of all eight"] == pytest.approx(8 ** (-8 / 9) * of_pin, rel=1e-12)
 
 
 def test_loads_with_limits_stand_before_those_of_the_shafts() -> None:

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.replay import CaseResult
-from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray, loads_of, units_of_loads
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Sentence, Table
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.questions.bearing_life.lives import HOUR, rated, turning_of
+from tolstat.questions.bearing_life.lives import HOUR, places_of, rated, turning_of
 from tolstat.store.view import View
 from tolstat.study import Study
 
@@ -102,11 +101,11 @@ def parts(
 
 
 def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Rating life of each pin's bearing and of the joint, h, (n,) each; none without what they need."""
-    bearing, pins = study.joint.bearing, kinds(study.mechanism)["contact"].places
+    """Rating life of each of `places_of`, h, (n,) each; none without what they need."""
+    bearing = study.joint.bearing
     if bearing is None or bearing.lacking(FOR_LIFE):
         return {}
-    names = [*(f"life of {pin}" for pin in pins), f"life of all {text.in_words(len(pins))}"]
+    names = [f"life of {bearings}" for bearings in places_of(study.mechanism).values()]
     return dict(zip(names, rated(bearing, np.ones(1), [turning])[1].T, strict=True))
 
 

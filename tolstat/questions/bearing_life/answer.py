@@ -104,9 +104,8 @@ def bearing_life(view: View) -> Answer:
         See `lives.lives_of`.
     """
     lives = rating.lives_of(view)
-    names = {lives.whole: f"all {text.in_words(len(lives.pins))}", rating.ANY: "at least one"}
-    names |= {joint: f"all of {joint}" for joint in lives.joints}
-    bearing = Column("bearing", lambda row: names.get(row["place"], str(row["place"])))
+    names = rating.places_of(view.mechanism) | {rating.ANY: "at least one"}
+    bearing = Column("bearing", lambda row: names[row["place"]])
     reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]

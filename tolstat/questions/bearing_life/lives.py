@@ -13,8 +13,9 @@ from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
-from tolstat.common.mechanism import prefixes
+from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
+from tolstat.display import text
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
@@ -80,18 +81,13 @@ class Lives:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Pins, of a drive shaft its joints, and the whole."""
-        return (*self.pins, *self.joints, self.whole)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints of a drive shaft by their names; none of a joint."""
-        return tuple(name.rstrip(".") for name in prefixes(self.view.mechanism)) if self.of_shaft else ()
+        """See `places_of`."""
+        return tuple(places_of(self.view.mechanism))
 
     @property
     def whole(self) -> str:
         """What all bearings are of: `JOINT` or `SHAFT`."""
-        return SHAFT if self.of_shaft else JOINT
+        return self.places[-1]
 
     @property
     def of_shaft(self) -> bool:
@@ -120,6 +116,17 @@ class Lives:
         k = self.pins.index(pin)
         nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
         return Sample.of(values, self.view.status, self.view.design, name=pin, unit="N", nominal=nominal)
+
+
+def places_of(mechanism: Mechanism) -> dict[str, str]:
+    """What has a life, with which bearings that is: each pin, of a drive shaft each joint, and the whole.
+
+    ``{"joint1.pin1": "joint1.pin1", ..., "joint1": "all of joint1", "joint2": "all of joint2", "shaft": "all eight"}``
+    """
+    pins = kinds(mechanism)["contact"].places
+    joints = [name.rstrip(".") for name in prefixes(mechanism)] if mechanism.is_shaft else []
+    whole = {SHAFT if mechanism.is_shaft else JOINT: f"all {text.in_words(len(pins))}"}
+    return {pin: pin for pin in pins} | {joint: f"all of {joint}" for joint in joints} | whole
 
 
 def lives_of(view: View) -> Lives:

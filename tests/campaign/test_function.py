@@ -128,6 +128,15 @@ def test_an_array_of_another_shape(x, words):
         f.uniform(np.zeros((1, 1)))
 
 
+@pytest.mark.parametrize("value", [1.5, -0.1, np.nan])
+def test_points_outside_the_unit_cube_are_refused(value):
+    f = tolstat.function(study_of(TEXT), "psi")
+    points = np.full((2, len(f.cube_names)), 0.5)
+    points[1, 0] = value
+    with pytest.raises(InputError, match=rf"{f.cube_names[0]} = {value:g} of point 1 is outside the unit cube"):
+        f.uniform(points)
+
+
 def test_kernels_that_some_joints_need_are_compiled_before_processes_start(monkeypatch):
     compiled = []
     monkeypatch.setattr(functions, "compile_missing", lambda mechanism, options, params=None: compiled.append(params))

@@ -14,7 +14,6 @@ from tolstat.study import crosses
 from tolstat.study.selection import error_units
 
 UNITS = error_units(CARDAN)
-VARIED = ["pin1.tilt_z", "pin1.offset_t", "hole2.diameter"]
 CROSS = "part;pin1.tilt_z;pin1.offset_t;pin1.contact_outer_max\n-;deg;mm;N\nA7;0,21;0,03;700\n"
 
 
@@ -26,22 +25,35 @@ def table(folder: Path, text: str) -> Path:
 
 def test_columns_that_are_there_are_read_and_the_others_counted_once(tmp_path: Path) -> None:
     path = table(tmp_path, CROSS)
-    columns, lines, notes = crosses.read(path, CARDAN, UNITS, VARIED)
+    columns, lines, notes = crosses.read(path, CARDAN, UNITS, {})
     assert lines == [3]
     assert columns.keys() == {"pin1.tilt_z", "pin1.offset_t"}
     np.testing.assert_allclose(columns["pin1.tilt_z"], np.radians([0.21]), rtol=1e-15)
     np.testing.assert_allclose(columns["pin1.offset_t"], [3e-5], rtol=1e-15)
     assert notes == [
         f"{path}: columns left out: part, 1 of results",
-        f"{path}: 1 error not measured: taken as nominal",
+        f"{path}: 46 errors not measured: taken as nominal",
     ]
+
+
+def test_errors_that_the_study_gives_are_told_from_nominal_ones(tmp_path: Path) -> None:
+    given = {"pin4.tilt_z": 0.01, "pin1.tilt_z": 0.01}
+    notes = crosses.read(table(tmp_path, CROSS), CARDAN, UNITS, given)[2]
+    assert notes[-1].endswith("46 errors not measured: taken as nominal, but for 1 of [errors]")
+
+
+def test_where_some_columns_have_units_all_need_them(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cross.csv:1: pin1.offset_t: has no unit"):
+        crosses.read(table(tmp_path, "pin1.offset_t;pin1.tilt_z [deg]\n0,005;0,21\n"), CARDAN, UNITS, {})
+    columns = crosses.read(table(tmp_path, "pin1.offset_t;pin1.tilt_z\n0,005;0,21\n"), CARDAN, UNITS, {}, ()).columns
+    assert columns["pin1.tilt_z"] == [0.21]
 
 
 def test_of_one_joint_the_errors_of_its_parts_are_counted(tmp_path: Path) -> None:
     """Four pins and four holes have five positions and angles and a diameter each; a clearance stands for diameters."""
-    _, notes = crosses.of_one(table(tmp_path, CROSS), CARDAN)
+    _, notes = crosses.of_one(table(tmp_path, CROSS), CARDAN, {})
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
-    errors, notes = crosses.of_one(table(tmp_path, "part,pin1.clearance [um]\nA7,5\n"), CARDAN)
+    errors, notes = crosses.of_one(table(tmp_path, "part,pin1.clearance [um]\nA7,5\n"), CARDAN, {})
     assert errors == {"pin1.clearance": pytest.approx(5e-6)}
     assert notes[0].endswith("columns left out: part")
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
@@ -64,7 +76,7 @@ REFUSED = {
     "no unit": ("pin1.tilt_z\n0.1\n", r"cross.csv:1: pin1.tilt_z: has no unit\n.*header: pin1.tilt_z \[deg\]"),
     "nothing measured": (
         "part,torque\n1,2\n",
-        r"has no column of an error\n.*write names such as pin1.tilt_z; there are part, torque",
+        r"has no column of an error\n.*write names such as pin1.offset_e; there are part, torque",
     ),
     "several joints": ("pin1.tilt_z [deg]\n0.1\n0.2\n", r"cross.csv:3: is a second joint\n.*tolstat evaluate STUDY"),
 }
@@ -74,7 +86,7 @@ REFUSED = {
 def test_faults_of_a_table(tmp_path: Path, name: str) -> None:
     text, words = REFUSED[name]
     with pytest.raises(InputError, match=words) as caught:
-        crosses.read(table(tmp_path, text), CARDAN, UNITS, VARIED, single=True)
+        crosses.read(table(tmp_path, text), CARDAN, UNITS, {}, single=True)
     assert len(caught.value.faults) == 1
 
 

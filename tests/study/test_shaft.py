@@ -45,6 +45,7 @@ CASES = HEAD + '[sampling]\nmethod = "cases"\n[[case]]\nname = "tilt"\nerrors.jo
 ENTRY = '{ plus_minus = "0.05 mm", distribution = "uniform" }'
 ZONE = '{ zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }'
 FIT = '{ basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+ENTRY_OF_SPLINE = '"shaft.spline" = { plus_minus = 1.0, distribution = "uniform" }'
 PARTNER = 'partner = { position = "after", alpha = "12 deg", inertia = "0.02 kg*m^2" }'
 JOINTS = ("joint1", "joint2")
 
@@ -217,8 +218,16 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
         ),
         (
             WHOLE.replace("[shaft]", 'axial_force = "20 N"\n[shaft]'),
-            ["operation.axial_force: has no effect: the output shaft is rigid along its axis | "
-             'write shaft.axial = "free" or a stiffness under [joint], or remove it'],
+            ["operation.axial_force: has no effect: the output shaft is rigid along its axis | remove it"],
+        ),
+        (
+            WHOLE.replace("[operation]", 'shaft.spline = { mu = 0.1, diameter = "40 mm" }\n[operation]'),
+            ["joint.shaft.spline: is that of one joint | write shaft.spline, that of the tubes, or remove it"],
+        ),
+        (
+            toleranced(ENTRY_OF_SPLINE),
+            ["tolerances.shaft.spline: selects nothing | only shafts with shaft.spline have it: add that, or remove "
+             "this entry"],
         ),
     ],
 )  # fmt: skip

@@ -138,13 +138,18 @@ class Function:
         ------
         InputError
             When joints of the study are listed, or depend on each other: with lots of several joints; when coordinates
-            are missing or unknown.
+            are missing, unknown, or not from 0 to 1.
         ValueError
             When an array has another shape.
         """
         self._check_free()
         columns = columns_of(u, self.cube_names, (), "cube_names")
         probabilities = np.column_stack([columns[name] for name in self.cube_names])
+        outside = np.argwhere(~((probabilities >= 0.0) & (probabilities <= 1.0)))
+        if outside.size:
+            row, column = outside[0]
+            value = f"{self.cube_names[column]} = {probabilities[row, column]:g} of point {row}"
+            raise input_error("u", f"{value} is outside the unit cube", "give coordinates from 0 to 1")
         errors = sampling.from_probabilities(self.study, probabilities)
         return np.column_stack([errors[name] for name in self.names])
 
@@ -278,7 +283,7 @@ class Function:
 
 
 def function(
-    study: Study | str | Path, loads: Sequence[str] | None = None, *, point: str = "", workers: int | None = None
+    study: Study | str | Path, loads: str | Sequence[str] | None = None, *, point: str = "", workers: int | None = None
 ) -> Function:
     """Loads of the joints of a study as a function of their errors, for other tools.
 
@@ -286,8 +291,9 @@ def function(
     ----------
     study : Study, str or Path
         Study, or its TOML file, with tolerances, a sweep or listed joints; how it samples is left to the other tool.
-    loads : sequence of str, optional
-        Names of loads or patterns such as ``cross*.F``; by default those with limits, without limits those of reports.
+    loads : str or sequence of str, optional
+        Name of a load or pattern such as ``cross*.F``, or several; by default those with limits, without limits those
+        of reports.
     point : str
         Operating point, of a study with several.
     workers : int, optional
@@ -304,6 +310,7 @@ def function(
     """
     study = study if isinstance(study, Study) else load(study)
     faults = []
+    loads = [loads] if isinstance(loads, str) else loads
     chosen: dict[str, None] = {}
     every = list(units_of_loads(study.mechanism))
     for pattern in (study.asked or shown_loads(study.mechanism)) if loads is None else loads:

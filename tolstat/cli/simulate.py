@@ -30,8 +30,9 @@ def simulate(
 
     Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
     the joint without errors: forces of the bushings, bending moments at the roots of pins and arms, contact forces of
-    the pins, and psi. If CASE has limits, or the joint what rating lives need, prints which limits are exceeded, and
-    the lives of the bearings.
+    the pins, and psi. The largest value may lie between two samples of --out: parts that strike ring for shorter. If
+    CASE has limits, or the joint what rating lives need, prints which limits are exceeded, and the lives of the
+    bearings.
 
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
 
@@ -40,12 +41,12 @@ def simulate(
     case : Path
         Case file (TOML): one joint with its errors.
     table : Path, optional
-        Text table of a measured joint: a column for each error that was measured, one row. They take the place of those
-        of CASE.
+        Text table of a measured joint: a column for each error that was measured, one row. Each takes the place of
+        that of CASE.
     """
     loaded = library.studies.load_case(case)
     if table is not None:
-        measured, notes = library.crosses.of_one(table, loaded.mechanism)
+        measured, notes = library.crosses.of_one(table, loaded.mechanism, loaded.errors)
         loaded = replace(loaded, errors=loaded.errors | measured)
         for note in notes:
             say(note)
@@ -177,7 +178,7 @@ def evaluate(
     names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
     needed = [name for name in names if uniform or name == library.function.VARIANT]
     varied = [name for name in names if name not in needed]
-    joints = library.crosses.read(errors, whole.mechanism, units, varied, needed)
+    joints = library.crosses.read(errors, whole.mechanism, units, None if uniform else whole.errors, needed)
     for note in joints.notes:
         say(note)
     own = dict.fromkeys(library.tables.FACTORS, 1.0) | whole.errors

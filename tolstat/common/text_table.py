@@ -181,6 +181,8 @@ class TextTable:
             self.fault(self.head, "", f"has no column {', '.join(map(repr, missing))}", remedy)
         columns = {name: self.columns[name] for name in si if name in self.columns}
         line_of_units = self._take_units(columns)
+        if any(self.units[name] for name in columns):
+            unit_of = {}  # where some columns say their unit, none is taken for granted
         values = np.array([[self.number(line, cells[i]) for i in columns.values()] for line, cells in self.rows])
         values = values.reshape(len(self.rows), len(columns))
         for row, column in np.argwhere(np.isnan(values)):

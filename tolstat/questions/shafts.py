@@ -133,7 +133,9 @@ def _places(view: View) -> Shafts:
         raise unusable(view, f"has {len(joints)} operating points with a partner", remedy)
     if len(at) < 2 or not view.sampled:
         remedy = 'give the file of a study with two operating points, with partner.position "after" and "before"'
-        raise inapplicable(view, "holds no drive shaft of two joints", remedy)
+        if view.mechanism.is_shaft:
+            remedy = f"its rows are shafts: tolstat report {view.store.path}"
+        raise inapplicable(view, "holds no two joints that stand for a drive shaft", remedy)
     return Shafts(at["after"], at["before"])
 
 

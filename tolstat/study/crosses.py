@@ -40,7 +40,7 @@ def read(
     path: Path,
     mechanism: Mechanism,
     units: Mapping[str, str],
-    varied: Collection[str],
+    given: Mapping[str, float] | None,
     needed: Collection[str] = (),
     single: bool = False,
 ) -> Crosses:
@@ -55,8 +55,8 @@ def read(
         What the joints are.
     units : mapping of str to str
         SI unit of each column that is read if there is one of this name.
-    varied : collection of str
-        Errors that are counted as not measured where they have no column.
+    given : mapping of str to float, optional
+        Errors that joints have without a column; others are nominal. None where the columns are no errors.
     needed : collection of str
         Columns that must be there.
     single : bool
@@ -80,11 +80,11 @@ def read(
         names = ", ".join(map(repr, wrong))
         table.fault(table.head, "", f"has columns that are no errors: {names}", f"remove or rename them: {instead}")
     elif not columns and not needed:
-        remedy = f"write names such as {next(iter(varied), next(iter(units)))}; there are {', '.join(others) or 'none'}"
+        remedy = f"write names such as {next(iter(units))}; there are {', '.join(others) or 'none'}"
         table.fault(table.head, "", "has no column of an error", remedy)
-    given = {name for name, values in columns.items() if values.any()}
+    not_zero = {name for name, values in columns.items() if values.any()}
     for name, diameters in excludes(mechanism).items():
-        if name.endswith(".clearance") and name in given and (beside := sorted(given & set(diameters))):
+        if name.endswith(".clearance") and name in not_zero and (beside := sorted(not_zero & set(diameters))):
             table.fault(table.head, name, f"is given beside {' and '.join(beside)}", "remove one or the other")
     if single and len(table.rows) > 1:
         table.fault(table.rows[1][0], "", "is a second joint", "give one row a file, or all to: tolstat evaluate STUDY")
@@ -92,14 +92,21 @@ def read(
     left_out = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
     notes = [f"columns left out: {', '.join(left_out)}"] if left_out else []
     told = {*columns, *(other for name in columns for other in excludes(mechanism).get(name, ()))}
-    if lacking := len(set(varied) - told):
-        notes.append(f"{lacking} error{'s' * (lacking > 1)} not measured: taken as nominal")
+    lacking = [name for name in _of_parts(mechanism) if name not in told]
+    if given is not None and lacking:
+        fixed = len(given.keys() & set(lacking))
+        but = f", but for {fixed} of [errors]" if fixed else ""
+        notes.append(f"{len(lacking)} error{'s' * (len(lacking) > 1)} not measured: taken as nominal{but}")
     return Crosses(columns, [line for line, _ in table.rows], [f"{path}: {note}" for note in notes])
 
 
-def of_one(path: Path, mechanism: Mechanism) -> tuple[dict[str, float], list[str]]:
+def _of_parts(mechanism: Mechanism) -> list[str]:
+    """Errors of pins and holes that can be measured; a clearance follows from diameters."""
+    parts = features(mechanism)
+    return [name for name in given_units(mechanism) if halves(name)[0] in parts and not name.endswith(".clearance")]
+
+
+def of_one(path: Path, mechanism: Mechanism, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
     """Errors of the only joint of a table, SI, and what there is to be said; see `read`."""
-    units = given_units(mechanism)
-    of_parts = [name for name in units if halves(name)[0] in features(mechanism) and not name.endswith(".clearance")]
-    columns, _, notes = read(path, mechanism, units, of_parts, single=True)
+    columns, _, notes = read(path, mechanism, given_units(mechanism), given, single=True)
     return {name: float(values[0]) for name, values in columns.items()}, notes

@@ -244,7 +244,7 @@ def _cases(file: Reading, axes: list[Axis]) -> dict[str, dict[str, float]]:
 
 def _measured(file: Reading, name: str, number: int) -> dict[str, Any]:
     """Errors of a measured joint as a study writes them; they take the place of the file in the study's text."""
-    measured, notes = crosses.of_one(file.folder / name, file.mechanism)
+    measured, notes = crosses.of_one(file.folder / name, file.mechanism, file.errors or {})
     units_of = error_units(file.mechanism)
     errors = {key: f"{value!r} {units_of[key]}" for key, value in measured.items()}
     file.parts["notes"] = (*file.parts["notes"], *notes)

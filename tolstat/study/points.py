@@ -259,8 +259,7 @@ class Setting(NamedTuple):
 
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        pulled = {FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0
-        return self.joint.shaft.slides and bool(pulled)
+        return self.joint.shaft.slides and bool({FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -278,8 +277,9 @@ def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[K
     """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        paths += [("joint", "shaft", "spline")] * any(setting.joint.shaft.spline for setting in settings)
-        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        own = [setting.joint for setting in settings if not isinstance(setting.operation, OperationOfShaft)]
+        paths += [("joint", "shaft", "spline")] * any(joint.shaft.spline for joint in own)
+        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or ' * bool(own) + "remove it"
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
 

@@ -175,15 +175,14 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     if remedy := without_joint(pattern, names):
         return remedy
     if key := giving(pattern):
-        return f"only joints with joint.{key} have it: add that, or remove this entry"
+        owner = "shafts with " if key == "shaft.spline" and "shaft.offset" in names else "joints with joint."
+        return f"only {owner}{key} have it: add that, or remove this entry"
     every = list(dict.fromkeys(halves(name)[0] for name in names))
     feature, key = (pattern, "") if pattern in every else halves(pattern)
     known = [name for name in every if _matches(feature, name)]
     if not known:
         rest = pattern.partition(".")[2]
-        if rest in every or select(rest, names):
-            return f"did you mean {rest!r}?"
-        return did_you_mean(feature, every)
+        return f"did you mean {rest!r}?" if rest in every or select(rest, names) else did_you_mean(feature, every)
     return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]])
 
 

@@ -214,12 +214,12 @@ class Function:
             return self(self.uniform(x) if is_cube else x)
 
         def gradient(point: Any) -> Array:
-            x = np.array(point)
+            x: Array = np.array(point)
             low, high = x - np.diag(steps), x + np.diag(steps)
             if is_cube:  # differences of points that are in it
                 low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
-            upper, lower = np.split(loads(np.vstack([high, low])), 2)
-            return (upper - lower) / np.diagonal(high - low)[:, None]
+            values = loads(np.vstack([high, low]))
+            return (values[: len(x)] - values[len(x) :]) / np.diagonal(high - low)[:, None]
 
         function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads, gradient=gradient)
         function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, function.getEvaluation()))

@@ -100,6 +100,20 @@ def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: flo
         assert np.abs(off).max() < 0.01 * largest
 
 
+@pytest.mark.parametrize(("plane", "sign"), [(0.0, 1), (np.pi, -1)])
+def test_statics_have_closed_forms_at_two_positions(plane: float, sign: int) -> None:
+    """Those of docs/drive.md, which are the largest loads of a revolution, too."""
+    first, second = np.radians((12.0, 5.0))
+    found = on_shafts(np.arange(360) * np.radians(1), (first, second), plane, 0.0, 1.2, 100.0)
+    force = 100.0 * np.sin(first + sign * second) / (1.2 * np.cos(first))
+    moments = 100.0 * np.sin(first) / np.cos(second), 100.0 * np.tan(second)
+    expected = ((force, 0.0), (0.0, moments[0]), (force, 0.0), (0.0, moments[1]))
+    for loads, (at_start, later) in zip(found[:4], expected, strict=True):
+        size = np.linalg.norm(loads, axis=1)
+        np.testing.assert_allclose(size[[0, 90]], [at_start, later], rtol=1e-12, atol=1e-12)
+        assert size.max() == pytest.approx(max(at_start, later), rel=1e-12)
+
+
 def test_an_order_of_the_speed_turns_the_inertia_of_the_whole_shaft() -> None:
     """Order 3 of the driving torque, of equal joints: moment of inertia of all parts times 9 a omega^2, within 2 %."""
     sections = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}

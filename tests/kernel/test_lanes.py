@@ -157,7 +157,7 @@ def assert_same(a, b):
 def alone(params, options, monkeypatch):
     results = np.zeros(len(params), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
-    monkeypatch.setattr(simulation, "MOST_ALONE", len(params))
+    monkeypatch.setattr(simulation, "width", lambda: 1)
     samples = {i: own.copy() for i, own in simulation.simulate_together(params, options, left, True, results)}
     monkeypatch.undo()
     stationary.fill_intervals(results)

@@ -56,9 +56,9 @@ def test_a_shaft_that_moves_across_has_the_accelerations_and_loads_of_the_twin()
 
 
 @MECHANISMS
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_accelerations_and_loads_are_those_of_the_naive_twin(drive, seed: int) -> None:
-    par, mechanism, t, q, v = state(seed, drive, **WHOLE)
+@pytest.mark.parametrize(("seed", "along"), [(1, 0.1), (2, 0.1), (3, 0.3)])
+def test_accelerations_and_loads_are_those_of_the_naive_twin(drive, seed: int, along: float) -> None:
+    par, mechanism, t, q, v = state(seed, drive, **WHOLE | {"friction": FRICTION | {"mu_along": along}})
     work, a = make_work(mechanism), np.full(mechanism.dof, np.nan)
     dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
     expected, largest = naive.forces(t, q, v, par, mechanism), np.abs(work.force).max()
@@ -110,9 +110,11 @@ def test_tangent_of_faces_is_the_slope_of_their_forces() -> None:
     np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
 
 
-def test_tangent_of_friction_is_its_slope_by_velocity() -> None:
+@pytest.mark.parametrize("along", [0.1, 0.3])
+def test_tangent_of_friction_is_its_slope_by_velocity(along: float) -> None:
     """Forces that press held: they have no damping here, so that they do not change with v."""
-    friction = FRICTION | {"slip_speed": "0.5 m/s"}  # pins slide as fast: the slope along it counts, and differs
+    # pins slide as fast as the slip speed: the slope along the sliding counts, and differs from that across it
+    friction = FRICTION | {"mu_along": along, "slip_speed": "0.5 m/s"}
     case = without("c_d", state(1, turned=1e-4, **WHOLE | {"friction": friction}))
     cv = 2000.0
     bare = without("mu", case)

@@ -91,7 +91,7 @@ def multiply_add(times, batch):
 def alone(params: NDArray[np.void], options: Options) -> NDArray[np.void]:
     """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
     results, left = np.zeros(len(params), RESULT), np.full(len(params), UNLIMITED)
-    with mock.patch.object(simulation, "MOST_ALONE", len(params)):
+    with mock.patch.object(simulation, "width", return_value=1):
         list(simulation.simulate_together(params, options, left, False, results.view(np.recarray)))
     return results
 

@@ -1,8 +1,7 @@
-"""Compilation in two processes."""
+"""Which kernels are compiled, and what is said of it."""
 
 from __future__ import annotations
 
-import subprocess
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,44 +18,20 @@ from tolstat.solver import compilation
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Kernels that this process compiles or loads, and code that another one runs; none is in the cache."""
+    """Kernels that are compiled or loaded; none is in the cache."""
     called: list[str] = []
-
-    class Process:
-        def __init__(self, command: list[str], **_: Any) -> None:
-            called.append(command[-1])
-
-        def __enter__(self) -> Process:
-            return self
-
-        def __exit__(self, *_: object) -> None:
-            pass
-
-        def wait(self) -> None:
-            called.append("wait")
-
-        def kill(self) -> None:
-            pass
 
     def note(name: str, *_: Any) -> None:
         called.append(name)
 
-    noted = {name: partial(note, name) for name in compilation.KERNELS}
-    monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setattr(compilation, "missing", compilation.kernels)
-    monkeypatch.setattr(compilation, "available_cores", lambda: 2)
-    monkeypatch.setattr(compilation, "KERNELS", noted)
+    monkeypatch.setattr(compilation, "KERNELS", {name: partial(note, name) for name in compilation.KERNELS})
     return called
 
 
-def test_some_kernels_are_compiled_in_a_second_process(calls: list[str]) -> None:
+def test_joints_of_a_campaign_need_their_kernels_alone(calls: list[str]) -> None:
     compilation.warm_up()
-    said, *own = calls
-    assert own[: own.index("wait")] == ["lockstep.lockstep", "starts.write_starts", "rainflow.count_joint"]
-    others = "['lockstep.one_at_a_time']"
-    assert f"compile_kernels({others}, Options(" in said
-    compile(said, "said", "exec")
-    assert own[own.index("wait") + 1 :] == compilation.kernels(Options())  # loaded
+    assert calls == ["lockstep.lockstep", "starts.write_starts", "rainflow.count_joint"]
 
 
 def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str], params: Any) -> None:
@@ -69,13 +44,6 @@ def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str],
 def test_closed_forms_compile_no_equations_of_motion(calls: list[str]) -> None:
     compilation.warm_up(Options(fidelity=int(Fidelity.IDEAL)))
     assert set(calls) == {"ideal.ideal_revolution", "rainflow.count_joint"}
-
-
-def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compilation, "available_cores", lambda: 1)
-    compilation.warm_up(Options())
-    assert "wait" not in calls
-    assert set(calls) == {name for name in compilation.KERNELS if not name.startswith(("explicit.", "ideal."))}
 
 
 def test_code_of_another_mechanism_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

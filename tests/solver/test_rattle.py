@@ -86,7 +86,7 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order(monkeypatch: 
 
     together, blocks = run(params)
     backwards, _ = run(params[::-1].copy())
-    monkeypatch.setattr(simulation, "MOST_ALONE", len(params))
+    monkeypatch.setattr(simulation, "width", lambda: 1)
     alone, own = run(params)
     assert_same(together, alone)
     for i, made in enumerate(together["revolutions"].astype(int)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ import pytest
 from tests.conftest import REFERENCE, with_orders
 from tests.support.held import RPM, drive_shaft, held
 from tests.support.statics import on_shafts
-from tolstat.common.tables import SIMULATED, Options
+from tolstat import sampling, study
+from tolstat.common.tables import SIMULATED, VALID, Options
+from tolstat.joint import perturb
 from tolstat.solver.simulation import simulate_rows
 
 pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
@@ -125,3 +128,41 @@ def test_an_order_of_the_speed_turns_the_inertia_of_the_whole_shaft() -> None:
     of_lumps = rows.mass[0, kinds] * rows.at[0, kinds, 0] ** 2 + rows.inertia[0, kinds, 2]
     drive = 2 * abs(order(3, found.histories["shafts"][0][:, 0, 5]))
     assert drive == pytest.approx((rows.Js[0, -1] + of_lumps.sum()) * 9 * 0.004 * (500 * RPM) ** 2, rel=0.02)
+
+
+HARD = """
+[joint]
+base = "pin25"
+thrust.end_play = "0.05 mm"
+shaft.axial = "rigid"
+[operation]
+alpha = "10.5 deg"
+speed = "2050 rpm"
+torque = "600 N*m"
+[shaft]
+alpha = "10.5 deg"
+arrangement = "Z"
+length = "1.2 m"
+tube = { diameter = "76 mm", wall = "2.5 mm" }
+spline = { at = "0.4 m", mu = 0.1, diameter = "40 mm" }
+[tolerances]
+"operation.alpha" = { plus_minus = "9.5 deg", distribution = "uniform" }
+"operation.speed" = { plus_minus = "1950 rpm", distribution = "uniform" }
+"joint*.thrust.end_play" = { plus_minus = "0.05 mm", distribution = "uniform" }
+"joint*.*.offset_[etz]" = { plus_minus = "0.03 mm", distribution = "normal", cpk = 1.0 }
+"joint*.*.tilt_[tz]" = { plus_minus = "0.05 deg", distribution = "normal", cpk = 1.0 }
+"shaft.alpha" = { plus_minus = "9.5 deg", distribution = "uniform" }
+"shaft.offset" = { plus_minus = "20 deg", distribution = "uniform" }
+[sampling]
+n = 48
+method = "random"
+seed = 8
+"""
+
+
+def test_hard_shafts_settle_or_are_stationary() -> None:
+    """End play to 0.1 mm, 100 to 4000 rpm, 1 to 20 degrees, needles that roll around pins and slide along them."""
+    hard = study.load(Path("hard.toml"), text=HARD)
+    rows = perturb(hard.joint, hard.operations[0], sampling.draw(hard, range(1, 49)))
+    status = simulate_rows(rows, hard.solver.options(), "none", mechanism=hard.mechanism).results["status"]
+    assert np.isin(status, VALID).all()

@@ -399,7 +399,7 @@ out = np.zeros(1, tables(CARDAN).RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
     options = Options(max_revs=revolutions, settle_tol=1e-12)
-    simulation.lanes(options, 1)
+    simulation.lanes(options, simulation.width())
     before = rtsys.get_allocation_stats().alloc
     list(simulation.simulate_together(par, options, np.full(1, 10**6), False, out))
     counts.append(rtsys.get_allocation_stats().alloc - before)

@@ -215,6 +215,12 @@ def test_lots_are_not_asked_for_where_an_entry_with_a_lot_has_a_fault(folder: Pa
     assert message.startswith(":9: tolerances.hole*.diameter.lot.share: 30: should be less than 1")
 
 
+def test_friction_along_pins_that_have_none_around(folder: Path) -> None:
+    study = STUDY.replace("own_joint.toml", "cirelli2021")
+    (message,) = refused(folder, study.replace("[operation]", "friction = { mu = 0, mu_along = 0.1 }\n[operation]"))
+    assert "joint.friction: 0.1 is friction along pins that have none around" in message
+
+
 def test_keys_of_friction_without_its_coefficient(folder: Path) -> None:
     study = STUDY.replace("own_joint.toml", "cirelli2021")
     with_radius = study.replace("[operation]", 'friction.radius = "9 mm"\n[operation]')

@@ -209,5 +209,5 @@ def parameters(name: str, mechanism: Mechanism) -> np.recarray[Any, Any]:
     row.face_k, row.face_c = common["thrust"]["k"], common["thrust"]["c"]
     if case["friction"]:
         row.mu, row.friction_radius = case["friction"]["mu"], case["friction"]["radius_m"]
-        row.slip_speed = case["friction"]["slip_speed_m_s"]
+        row.mu_ratio, row.slip_speed = 1.0, case["friction"]["slip_speed_m_s"]
     return params

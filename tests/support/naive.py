@@ -239,7 +239,10 @@ def rubbing_of(p, now, par, mechanism):
         surface = point + par.friction_radius * n
         w = velocity_at(surface, pin, now) - velocity_at(surface, hole, now)
         w = w - (w @ n) * n
-        force = -par.mu * pressing * w / np.sqrt(w @ w + par.slip_speed**2)
+        axis = now.bodies.attitude[hole] @ par.hole_axis[p]
+        around_and_along = np.eye(3) + (par.mu_ratio - 1) * np.outer(axis, axis)
+        u = around_and_along @ w
+        force = -par.mu * pressing * around_and_along @ u / np.sqrt(u @ u + par.slip_speed**2)
         found.append((surface, force, -force @ w))
     return found
 

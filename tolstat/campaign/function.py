@@ -213,8 +213,15 @@ class Function:
             x = np.array(sample)
             return self(self.uniform(x) if is_cube else x)
 
-        function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads)
-        function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, function.getEvaluation()))
+        def gradient(point: Any) -> Array:
+            x: Array = np.array(point)
+            low, high = x - np.diag(steps), x + np.diag(steps)
+            if is_cube:  # differences of points that are in it
+                low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+            values = loads(np.vstack([high, low]))
+            return (values[: len(x)] - values[len(x) :]) / np.diagonal(high - low)[:, None]
+
+        function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads, gradient=gradient)
         function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, function.getEvaluation()))
         function.setInputDescription(names)
         function.setOutputDescription(self.loads)

@@ -115,7 +115,8 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         ),
         Field("face_k", "N/m", "stiffness of a thrust face"),
         Field("face_c", "N*s/m", "damping of a thrust face"),
-        Field("mu", "1", "coefficient of friction of pins in holes"),
+        Field("mu", "1", "coefficient of friction of pins around their axes"),
+        Field("mu_ratio", "1", "coefficient of friction along the pins over that around them"),
         Field("friction_radius", "m", "distance from the pin's axis at which friction acts"),
         Field("slip_speed", "m/s", "sliding speed over which friction rises"),
         Field(

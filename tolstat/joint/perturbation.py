@@ -215,6 +215,7 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "face_k": joint.thrust.k if joint.thrust else 0.0,
         "face_c": joint.thrust.c if joint.thrust else 0.0,
         "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
+        "mu_ratio": joint.friction.ratio,
         "slip_speed": joint.friction.slip_speed,
         "bearing_at": np.reshape(
             [

@@ -19,7 +19,7 @@ from tolstat.joint.model import Assumed, Joint, affects_results, laid_over, leav
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
-OF_FRICTION = {"friction.radius", "friction.slip_speed"}
+OF_FRICTION = {"friction.mu_along", "friction.radius", "friction.slip_speed"}
 NO_MU = "has no effect without friction.mu: there is no friction", "give friction.mu, too, or remove this key"
 
 

@@ -7,7 +7,7 @@ out: `Joint` fills it in by the formula of `derived.DERIVED`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator, model_validator
 
@@ -195,12 +195,27 @@ class Friction(Strict):
     """Friction of the pins in their bearings."""
 
     mu: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
-    """coefficient of friction, up to 1: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15; when left out: no
-    friction"""
+    """coefficient of friction around the pins, up to 1: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15;
+    when left out: no friction"""
+    mu_along: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
+    """coefficient of friction along the pins, up to 1: needles roll around a pin and slide along it, 0.05 to 0.1; when
+    left out: as around"""
     radius: Length | None = Field(default=None, examples=["12.5 mm"])
     """distance from the pin's axis at which surfaces slide; when left out: contact.D_P/2"""
     slip_speed: Annotated[units.Velocity, POSITIVE] = Field(default=1e-2, examples=["0.01 m/s"])
     """sliding speed over which friction rises"""
+
+    @model_validator(mode="after")
+    def _check_along(self) -> Self:
+        if self.mu == 0.0 and self.mu_along:
+            remedy = "give mu above zero, such as 1e-3, or mu_along = 0, too"
+            raise refuse(f"{self.mu_along:g} is friction along pins that have none around", remedy, "mu_along")
+        return self
+
+    @property
+    def ratio(self) -> float:
+        """Coefficient along the pins over that around them."""
+        return self.mu_along / self.mu if self.mu and self.mu_along is not None else 1.0
 
 
 class Unbalance(Strict):

@@ -1,13 +1,9 @@
-"""Compilation of the kernels, once per machine and version, in two processes where there are two cores."""
+"""Compilation of the kernels, once per machine and version."""
 
 from __future__ import annotations
 
 import logging
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +11,6 @@ from numpy.typing import NDArray
 
 from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import load_histories
-from tolstat.common.cores import available_cores
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import mark_of
 from tolstat.common.tables import Fidelity, Options, blank_params
@@ -35,9 +30,9 @@ def _outside_model(mechanism: Mechanism, torque_reverses: bool = False) -> NDArr
     return params
 
 
-def _simulate(joints: int, options: Options, mechanism: Mechanism) -> None:
-    params, results = np.repeat(_outside_model(mechanism), joints), simulation.blank_results(joints, mechanism)
-    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results, mechanism=mechanism))
+def _simulate(options: Options, mechanism: Mechanism) -> None:
+    params, results = _outside_model(mechanism), simulation.blank_results(1, mechanism)
+    list(simulation.simulate_together(params, options, np.ones(1, np.int64), False, results, mechanism=mechanism))
 
 
 def _explicit(options: Options, mechanism: Mechanism) -> None:
@@ -61,17 +56,14 @@ def _count_cycles(options: Options, mechanism: Mechanism) -> None:
 
 
 KERNELS: dict[str, Callable[[Options, Mechanism], object]] = {
-    "lockstep.lockstep": partial(_simulate, simulation.MOST_ALONE + 1),
-    "lockstep.one_at_a_time": partial(_simulate, 1),
+    "lockstep.lockstep": _simulate,
     "explicit.explicit": _explicit,
     "explicit.count_steps": _count_steps,
     "starts.write_starts": _starts,
-    "ideal.ideal_revolution": partial(_simulate, 1),
+    "ideal.ideal_revolution": _simulate,
     "rainflow.count_joint": _count_cycles,
 }
 """Kernels that Python calls, by their names in the cache, each with a call that compiles it."""
-SECOND = ("lockstep.one_at_a_time", "explicit.explicit")
-"""Kernels that the second process compiles; they take about as long as all others together."""
 
 
 def kernels(options: Options, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN) -> list[str]:
@@ -115,38 +107,12 @@ def is_compiled(
 def warm_up(
     options: Options | None = None, params: NDArray[np.void] | None = None, mechanism: Mechanism = CARDAN
 ) -> None:
-    """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
+    """Compile the kernels that joints with `options` need, such as `params`, or load them."""
     options = options or Options()
-    names = missing(options, params, mechanism)
-    if names:
+    if missing(options, params, mechanism):
         LOG.info("compiling the kernels of this study, up to some minutes, once per version")
-    second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
-    with _compiling(second, options, mechanism):
-        compile_kernels([name for name in names if name not in second], options, mechanism)
-    compile_kernels(kernels(options, params, mechanism), options, mechanism)
-
-
-def compile_kernels(names: list[str], options: Options, mechanism: Mechanism = CARDAN) -> None:
-    """Compile or load these kernels of `KERNELS`."""
-    for name in names:
+    for name in kernels(options, params, mechanism):
         KERNELS[name](options, mechanism)
-
-
-@contextmanager
-def _compiling(names: list[str], options: Options, mechanism: Mechanism) -> Iterator[None]:
-    """Compile kernels into the cache in a second process; what fails there is compiled when it is called."""
-    if not names:
-        yield
-        return
-    called = f"compile_kernels({names!r}, Options{tuple(options)!r}, cardan.MECHANISMS[{mechanism.name!r}])"
-    code = f"from {__name__} import *; {called}"
-    none = subprocess.DEVNULL
-    with subprocess.Popen([sys.executable, "-c", code], stdin=none, stdout=none, stderr=none) as second:
-        try:
-            yield
-            second.wait()
-        finally:
-            second.kill()
 
 
 def stage_name(mechanism: Mechanism = CARDAN) -> str:

@@ -30,9 +30,6 @@ NEARLY_REVERSING = 0.8
 """Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost
 less than error-controlled ones."""
 
-MOST_ALONE = 3
-"""Number of joints up to which they are simulated one after the other."""
-
 UNIFORM_REVS = 4
 """Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
@@ -54,15 +51,11 @@ def blank_results(shape: int | tuple[int, ...], mechanism: Mechanism = CARDAN) -
     return np.zeros(shape, tables.tables(mechanism).RESULT).view(np.recarray)
 
 
-def width_for(joints: int) -> int:
-    """Number of lanes for so many joints: a few of them take less time alone than in lanes most of which are empty.
-
-    Without compilation there are no lanes.
-    """
+def width() -> int:
+    """Number of lanes: those of a register; without compilation, one joint at a time."""
     from tolstat.kernel.simd.lane import WIDTH
 
-    switched_off = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-    return 1 if switched_off or joints <= MOST_ALONE else WIDTH
+    return WIDTH if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0") else 1
 
 
 def simulate_rows(
@@ -157,7 +150,6 @@ def simulate_together(
     from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
-    from tolstat.kernel.simd.lane import WIDTH
 
     steps = np.zeros(len(params), np.int64) if steps is None else steps.copy()
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
@@ -173,8 +165,7 @@ def simulate_together(
                 none = tables.for_kernels(blank_results((0, 0), mechanism), mechanism)
                 alone = queue._replace(left=allowed.copy(), blocks=none)
                 run_lanes(alone, options._replace(max_revs=START_ONLY), mechanism)
-                all_lanes = width_for(WIDTH)  # for a few joints, too: the kernel is compiled for this width alone
-                explicit(steps[here], options, lanes_for(queue, options, all_lanes, mechanism), queue)
+                explicit(steps[here], options, lanes_for(queue, options, mechanism), queue)
                 steps[here[queue.results.status == Status.NEWTON_FAILED]] = 0
             else:
                 run_lanes(queue, options, mechanism)
@@ -204,20 +195,16 @@ def make_queue(
 
 def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
     """Simulate the joints of a queue in lock-step; return the counts of `kernel.lanes.lockstep.lockstep`."""
-    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep, one_at_a_time
+    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
 
-    width, tally = width_for(len(queue.rows)), np.zeros(3, np.int64)
-    batch = lanes_for(queue, options, width, mechanism)
-    if width == 1:
-        one_at_a_time(options, batch, queue, tally)
-    else:
-        lockstep(options, PATIENCE, batch, queue, tally)
+    tally = np.zeros(3, np.int64)
+    lockstep(options, PATIENCE if width() > 1 else 1, lanes_for(queue, options, mechanism), queue, tally)
     return tally
 
 
-def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
+def lanes_for(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
-    batch = lanes(options, width, mechanism)
+    batch = lanes(options, width(), mechanism)
     batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
     return batch
 

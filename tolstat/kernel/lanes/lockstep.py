@@ -303,9 +303,3 @@ def lockstep(options, patience, batch, queue, tally):
                     start_cells(lane, rows[joint], options, controls, motions, past)
                 continue
             queued = fill(lane, queued, options, batch, queue)
-
-
-@njit
-def one_at_a_time(options, batch, queue, tally):
-    """Simulate the joints of a queue one after the other, with a batch of width 1; `tally` as of `lockstep`."""
-    lockstep(options, 1, batch, queue, tally)

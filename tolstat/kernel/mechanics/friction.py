@@ -11,11 +11,19 @@ from tolstat.kernel.simd.lane import any_of, where
 
 
 @njit
+def lengthen(vector, axis, par):
+    """S of `vector`: its part along the pin's `axis` counts by the ratio of the coefficients of friction."""
+    return axpy((par.mu_ratio - 1) * dot(vector, axis), axis, vector)
+
+
+@njit
 def rub(pin, par, work):
     """Add the friction of a pin to pin and hole; write ``work.rubbing[pin]`` and ``work.loss[pin]``.
 
-    Where a station presses, the surfaces slide with w; friction is mu f w / sqrt(w^2 + v_s^2). Its slopes by w along
-    and across w are those of the tangent, SLOPE and DAMPING; that by the force f is not symmetric, and left out.
+    Where a station presses, the surfaces slide with w, and u = S w, where S lengthens the part along the pin by the
+    ratio of the coefficients along and around it; friction is mu f S u / sqrt(u^2 + v_s^2). Its slopes by u along and
+    across u are those of the tangent, SLOPE and DAMPING, with S of these directions; that by the force f is not
+    symmetric, and left out.
     """
     body, hinge, loss = par.pin[pin], par.hinge[pin], 0.0 * work.drive[0]
     for j in range(par.n_stations):
@@ -28,21 +36,20 @@ def rub(pin, par, work):
         point = (station[POINT], station[POINT + 1], station[POINT + 2])
         surface = point_to_pin(hinge, axpy(par.friction_radius, normal, point), par, work)
         point, velocity = in_hole(pin, sub(surface, row(work.pos, body)), par, work)
-        w = axpy(-dot(velocity, normal), normal, velocity)
-        square = dot(w, w)
+        round_pin = (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2])
+        axis = cross(normal, round_pin)
+        u = lengthen(axpy(-dot(velocity, normal), normal, velocity), axis, par)
+        square = dot(u, u)
         regular = square + par.slip_speed * par.slip_speed
         drag = par.mu * station[FORCE] / math.sqrt(regular)
         sliding = square > 0
-        along = choose(
-            sliding,
-            scale(1 / math.sqrt(where(sliding, square, 1.0)), w),
-            (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2]),
-        )
-        across = cross(normal, along)
+        along = choose(sliding, scale(1 / math.sqrt(where(sliding, square, 1.0)), u), round_pin)
+        across = lengthen(cross(normal, along), axis, par)
+        along = lengthen(along, axis, par)
         for k in range(3):
             rubbing[POINT + k], rubbing[NORMAL + k], rubbing[TANGENT + k] = point[k], along[k], across[k]
         rubbing[FORCE] = drag * math.sqrt(square)
         rubbing[SLOPE], rubbing[DAMPING] = drag * (1 - square / regular), drag
-        push(pin, point, scale(drag, w), par, work)
+        push(pin, point, scale(drag, lengthen(u, axis, par)), par, work)
         loss += drag * square
     work.loss[pin] = loss

@@ -181,7 +181,6 @@ def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = bearings.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}")
     bearings.write_text(text, encoding="utf-8")
     tolstat.run(tolstat.load(bearings, n=60), folder / "needle_bearings.h5", workers=1)
-    tolstat.run(tolstat.load(folder / "studies" / "drive_shaft.toml", n=40), folder / "drive_shaft.h5", workers=1)
     done = CliRunner().invoke(app, ["export", str(folder / "iso2768_f.h5"), "--csv", str(folder / "joints.csv")])
     assert done.exit_code == 0, done.stderr
     return folder

@@ -14,7 +14,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
 from tolstat.joint.model import GIVEN_BY
-from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
+from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.shaft import SplineOfTubes, Tube
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
@@ -223,7 +223,6 @@ def tables() -> dict[str, str]:
         "cost": CostEntry,
         "torque order": TorqueOrder,
         "speed order": SpeedOrder,
-        "partner": Partner,
         "fit": FitEntry,
         "tube": Tube,
         "spline": SplineOfTubes,

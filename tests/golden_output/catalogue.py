@@ -22,7 +22,7 @@ COMMANDS = (
         "bearing-life",
         "orders",
     ),
-    *("change", "allocate", "compare", "shafts", "rare", "export", "docs", "cache"),
+    *("change", "allocate", "compare", "rare", "export", "docs", "cache"),
 )
 
 

@@ -109,14 +109,10 @@ WELDED = Campaign(
         "cycles": ["export welded_fork.h5 --pylife cycles.csv", "export welded_fork.h5 --csv joints.csv"],
     },
 )
-SHAFT = Campaign(
-    "drive_shaft",
-    ["run drive_shaft.toml --n 48"],
-    {
-        "report": ["report drive_shaft.h5 --wide --accept '5 %' --out wide"],
-        "shafts": [*forms("shafts drive_shaft.h5"), "shafts drive_shaft.h5 --out shafts"],
-        "page": ["report drive_shaft.h5 --out page.html --accept '30 %' --replay 20"],
-    },
+ORDER = Campaign(
+    "engine_order",
+    ["run engine_order.toml --n 24"],
+    {"page": ["report engine_order.h5 --out page.html --accept '30 %' --replay 20"]},
 )
 TRUCK = Campaign(
     "shaft",

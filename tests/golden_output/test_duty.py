@@ -3,4 +3,4 @@
 from tests.golden_output import catalogue_studies as catalogue
 from tests.golden_output.same import test_output_is_that_of_the_golden_file as test_output_is_that_of_the_golden_file
 
-CAMPAIGNS = (catalogue.POINTS, catalogue.NEEDLES, catalogue.WELDED, catalogue.SHAFT)
+CAMPAIGNS = (catalogue.POINTS, catalogue.NEEDLES, catalogue.WELDED)

@@ -1,15 +1,16 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``snap_rings.h5``, and,
-compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of
-each, and ``tilted_pin.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``engine_order.h5``,
+``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or
+all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
 """
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 
 import matplotlib as mpl
@@ -18,6 +19,7 @@ from scipy.stats import binom
 
 import tolstat
 from tests.support.environment import ROOT
+from tests.support.statics import on_shafts
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import split
 from tolstat.common.tables import Status
@@ -25,6 +27,7 @@ from tolstat.display import style
 from tolstat.display.answer import Answer
 from tolstat.display.blocks import Panel, Panels
 from tolstat.joint import operating
+from tolstat.joint.shaft import PLANES
 from tolstat.questions.shares import with_ends
 from tolstat.store import recorded
 
@@ -184,23 +187,52 @@ def lots(folder: Path) -> None:
     save(figure, folder / "lots.png")
 
 
-def shaft(folder: Path) -> None:
-    """Draw the share of shafts above the largest force of a bearing at each end, with 95 % intervals."""
+def of_shafts(folder: Path, name: str, loads: dict[str, str], limit: str, words: str) -> None:
+    """Draw the share of shafts above the largest of some loads, by label, with 95 % intervals."""
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    with tolstat.open(folder / "shaft.h5") as store:
+    with tolstat.open(folder / f"{name}.h5") as store:
         view = store.view()
-        for end, label, colour in (("input", "gearbox", "#0072B2"), ("output", "axle", "#D55E00")):
-            force = np.max([view.load(f"{end}.bearing_{bearing}").values for bearing in "ab"], axis=0)
+        for (label, pattern), colour in zip(loads.items(), ("#0072B2", "#D55E00"), strict=True):
+            force = np.max([view.load(key).values for key in view.limits if fnmatch(key, pattern)], axis=0)
             count = np.arange(force.size, 0, -1)
             ax.step(np.sort(force), 100 * count / force.size, color=colour, where="pre", label=label)
             lower, upper = clopper_pearson(count, force.size)
             ax.fill_between(np.sort(force), 100 * lower, 100 * upper, color=colour, step="pre", alpha=0.2, lw=0)
-        ax.axvline(view.limits["input.bearing_a"], color="#333333", ls="--", label="limit")
-    ax.set(xlabel="largest force of a bearing (N)", ylabel="shafts above it (%)", yscale="log", ylim=(0.3, 150))
+        ax.axvline(view.limits[limit], color="#333333", ls="--", label="limit")
+    ax.set(xlabel=f"{words} (N)", ylabel="shafts above it (%)", yscale="log", ylim=(0.3, 150))
     ax.set_yticks([1, 10, 100], ["1", "10", "100"])
     ax.grid(alpha=0.3)
     ax.legend()
-    save(figure, folder / "shaft.png")
+    save(figure, folder / f"{name}.png")
+
+
+def shaft(folder: Path) -> None:
+    """Draw the largest force of a bearing at each end."""
+    ends = {"gearbox": "input.bearing_?", "axle": "output.bearing_?"}
+    of_shafts(folder, "shaft", ends, "input.bearing_a", "largest force of a bearing")
+
+
+def engine_order(folder: Path) -> None:
+    """Draw the largest force on a pin of each joint."""
+    joints = {"joint 1": "joint1.cross?.F", "joint 2": "joint2.cross?.F"}
+    of_shafts(folder, "engine_order", joints, "joint1.cross1.F", "largest force on a pin")
+
+
+def statics(folder: Path) -> None:
+    """Draw what a slow shaft without errors loads its neighbours with, in Z and in W arrangement."""
+    alphas, degrees = np.radians((8.0, 6.0)), np.arange(361)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    for name, colour in (("Z", "#0072B2"), ("W", "#D55E00")):
+        found = on_shafts(np.radians(degrees), alphas, PLANES[name], 0.0, 1.2, 600.0)
+        axes[0].plot(degrees, np.linalg.norm(found.input_force, axis=1), color=colour, label=name)
+    for moment, label, line in ((found.input_moment, "input, 8°", "-"), (found.output_moment, "output, 6°", "--")):
+        axes[1].plot(degrees, np.linalg.norm(moment, axis=1), color="#333333", ls=line, label=label)
+    for ax, label in zip(axes, ("force across the outer shafts (N)", "bending moment (N m)"), strict=True):
+        ax.set(xlabel="angle of the input shaft (°)", ylabel=label, xticks=range(0, 361, 90))
+        ax.set_ylim(0, 1.2 * ax.dataLim.ymax)
+        ax.grid(alpha=0.3)
+        ax.legend(loc="upper center", ncols=2)
+    save(figure, folder / "statics.png")
 
 
 def snap_rings(folder: Path) -> None:
@@ -316,6 +348,8 @@ def main(folder: Path) -> None:
         known_parts,
         lots,
         shaft,
+        engine_order,
+        statics,
         snap_rings,
     )
     for draw in (*drawn, rigid_shafts, line_bored):

@@ -13,21 +13,20 @@ from tolstat import joint, sampling, study
 from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.joint import ideal
-from tolstat.joint.orders import Partner, add_partner
 from tolstat.solver.simulation import simulate_rows
 
 SHAFT_LOADS = ("axial", "lateral", "moment", "drive")
 DEGREE = np.pi / 180
 
 
-def behind_a_partner(alpha: float, offset: float = 0.0) -> list[tuple[int, float, float]]:
+def behind_a_joint(alpha: float) -> list[tuple[int, float, float]]:
     """Orders of the output of an ideal joint: theta_o - theta = sum tan^2k(alpha / 2) / k sin(2 k theta)."""
     t = np.tan(alpha / 2) ** 2
-    return [(2 * k, t**k / k, -2 * k * (np.pi / 2 + offset)) for k in range(1, 13)]
+    return [(2 * k, t**k / k, -k * np.pi) for k in range(1, 13)]
 
 
 ORDERS = {
-    "random_00_second15_90": {"speed": behind_a_partner(15 * DEGREE)[:5]},
+    "random_00_second15_90": {"speed": behind_a_joint(15 * DEGREE)[:5]},
     "random_01_speed1": {"speed": [(1, 0.02, 30 * DEGREE)]},
     "random_01_torque1": {"torque": [(1, 20.0, 45 * DEGREE)]},
 }
@@ -74,12 +73,12 @@ def test_closed_form_of_the_input_is_the_naive_twin(params):
 
 @pytest.mark.parametrize("fidelity", [Fidelity.IDEAL, Fidelity.QUASISTATIC, Fidelity.DYNAMIC])
 def test_two_equal_joints_turn_the_output_evenly(params, fidelity):
-    """Behind a partner of the same misalignment, forks in one plane: output speed constant, pin force known.
+    """Behind an ideal joint of the same misalignment, forks in one plane: output speed constant, pin force known.
 
     Seherr-Thoss, Schmelz, Aucktor (2006), ch. 4: the pins carry T / cos(gamma) / (2 R').
     """
     alpha, torque = 30 * DEGREE, 100.0
-    par = with_orders(params(alpha=alpha, speed=2 * np.pi / 60, torque=torque), speed=behind_a_partner(alpha))
+    par = with_orders(params(alpha=alpha, speed=2 * np.pi / 60, torque=torque), speed=behind_a_joint(alpha))
     found = simulate_rows(par, Options(fidelity=int(fidelity)), histories="full")
     phase = 2 * np.pi * np.arange(180) / 180
     theta, slope, _, _ = (values[0] for values in ideal.input_motion(phase, par))
@@ -180,65 +179,3 @@ def test_torque_orders_up_to_the_mean_torque_end_in_a_status():
     results = simulate_rows(par, Options()).results
     assert np.isin(results["status"], [Status.OK, Status.STATIONARY]).mean() > 0.98
     assert (results["status"] != Status.PENDING).all()
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.7])
-def test_partner_before_turns_the_input_as_the_ideal_joint_does(params, offset):
-    """The series of the ideal joint, theta_o - theta = sum tan^2k(alpha / 2) / k sin(2 k theta)."""
-    alpha = 35 * DEGREE
-    behind = Partner(position="before", alpha="35 deg", offset=f"{offset} rad", inertia="0.03 kg*m^2")
-    par = params(alpha=0.2)
-    add_partner(behind, par)
-    phase = np.linspace(0, 7, 40)
-    series = sum(a * np.sin(n * phase + p) for n, a, p in behind_a_partner(alpha, offset))
-    np.testing.assert_allclose(ideal.input_motion(phase, par)[0][0], phase + series, atol=1e-9)
-    assert par.torque[0] == pytest.approx(100, rel=1e-14)
-    assert par.Js[0] == 0.03
-
-
-@pytest.mark.parametrize("speed", [[], [(1, 0.1, 0.3)]])
-def test_partner_after_takes_the_power_of_load_and_inertia(params, speed):
-    """T_r times the speed of the intermediate shaft is the load's power and the rate of the kinetic energy behind."""
-    alpha, second, offset, inertia, omega = 20 * DEGREE, 30 * DEGREE, 0.4, 0.05, 150.0
-    par = with_orders(params(alpha=alpha, speed=omega), speed=speed, torque=[(2, 30.0, 0.5)])
-    load = par.copy()
-    after = Partner(position="after", alpha="30 deg", offset="0.4 rad", inertia="0.05 kg*m^2")
-    add_partner(after, par)
-
-    def turned(phase):
-        middle = ideal.output_angle(ideal.input_motion(phase, load)[0][0], alpha)
-        return middle, ideal.output_angle(middle + np.pi / 2 + offset, second)
-
-    h, phase = 1e-4, np.linspace(0, 2 * np.pi, 50)
-    angles = [turned(phase + k * h) for k in (-2, -1, 0, 1, 2)]
-    middle, out = (omega * (angles[3][i] - angles[1][i]) / (2 * h) for i in (0, 1))
-    energies = [0.5 * inertia * (omega * (angles[k + 1][1] - angles[k - 1][1]) / (2 * h)) ** 2 for k in (1, 3)]
-    power = ideal.input_motion(phase, load)[3][0] * out + omega * (energies[1] - energies[0]) / (2 * h)
-    np.testing.assert_allclose(ideal.input_motion(phase, par)[3][0] * middle, power, rtol=1e-5)
-    np.testing.assert_allclose(ideal.input_motion(phase, par)[0], ideal.input_motion(phase, load)[0], atol=1e-9)
-
-
-@pytest.mark.parametrize("position", ["before", "after"])
-def test_forces_on_both_joints_of_a_slow_drive_shaft(params, position):
-    """Equal angles, offset 0: T sqrt(1 - sin^2 alpha cos^2 theta) / (2 R' cos alpha), in the second 90 deg later.
-
-    Seherr-Thoss, Schmelz, Aucktor (2006), ch. 4, for the torque at the end of the drive shaft.
-    """
-    alpha, torque = 25 * DEGREE, 80.0
-    par = params(alpha=alpha, speed=2 * np.pi / 60, torque=torque)
-    add_partner(Partner(position=position, alpha="25 deg", inertia="0.02 kg*m^2"), par)
-    found = simulate_rows(par, Options(fidelity=int(Fidelity.IDEAL)), histories="full")
-    # the joint's own fork stands at an angle that is even in the phase of the shaft's ends
-    phase = 2 * np.pi * np.arange(180) / 180 - (np.pi / 2 if position == "before" else 0)
-    radius = par.R[0] + par.station_s[0, 0]
-    expected = torque * np.sqrt(1 - (np.sin(alpha) * np.cos(phase)) ** 2) / (2 * radius * np.cos(alpha))
-    force = np.linalg.norm(found.histories["loads"][0, :, 0, :3].astype(float), axis=1)
-    for of in (np.max, np.mean, np.min):
-        assert of(force) == pytest.approx(of(expected), rel=1e-6)
-    np.testing.assert_allclose(force, expected, rtol=1e-6)
-    moment = found.results["moment_max"][0]
-    bending = {"input": torque * np.tan(alpha), "output": torque * np.sin(alpha)}
-    outer, inner = ("output", "input") if position == "before" else ("input", "output")
-    places = {"input": 0, "output": 1}
-    assert moment[places[outer]] == pytest.approx(bending["input"], rel=1e-4)
-    assert moment[places[inner]] == pytest.approx(bending["output"], rel=1e-4)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import REFERENCE
+from tests.conftest import REFERENCE, with_orders
 from tests.support.held import RPM, drive_shaft, held
 from tests.support.statics import on_shafts
 from tolstat import sampling, study
@@ -78,7 +78,10 @@ def test_loss_and_loads_of_the_outer_shafts_are_those_of_the_reference(name: str
     [((8, 8), "W", 0.0, 0.0), ((8, 6), "Z", np.pi, 0.0), ((12, 5), "50 deg", np.radians(50), 0.2)],
 )
 def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: float, offset: float) -> None:
-    """Forces and moments across the outer shafts at 20 rpm, within 1 %; a light preload leaves nothing loose."""
+    """Forces and moments across the outer shafts, forces of pins at 20 rpm, within 1 %; a light preload holds crosses.
+
+    Each pin takes M / 2 R' across it, with the couple M of its joint and R' the distance of the outer ends of holes.
+    """
     first, second = np.radians(alphas)
     shaft = drive_shaft(second, arrangement, offset=f"{offset} rad")
     sections = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}
@@ -87,12 +90,44 @@ def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: flo
     assert found.results["status"][0] in SIMULATED
     loads = found.histories["shafts"][0]
     expected = on_shafts(np.arange(180) * np.radians(2), (first, second), plane, offset, 1.2, 100.0)
-    for k, (force, moment) in enumerate((expected[:2], expected[2:])):
+    names, radius = [bushing.name for bushing in mechanism.bushings], rows.R[0] + rows.station_s[0].max()
+    for joint, couple in enumerate(expected.couples.T):
+        of_pins = [names.index(f"joint{joint + 1}.cross{pin}") for pin in (1, 2, 3, 4)]
+        pins = np.linalg.norm(found.histories["loads"][0][:, of_pins, 1:3], axis=2)
+        np.testing.assert_allclose(pins.mean(axis=1), couple / (2 * radius), rtol=0.005)
+    for k, (force, moment) in enumerate((expected[:2], expected[2:4])):
         largest = np.linalg.norm(moment, axis=1).max()
         off = np.linalg.norm(loads[:, k, :2], axis=1) - np.linalg.norm(force, axis=1)
         assert np.abs(off).max() < 0.01 * largest / 1.2  # forces are moments over the shaft's length
         off = np.linalg.norm(loads[:, k, 3:5], axis=1) - np.linalg.norm(moment, axis=1)
         assert np.abs(off).max() < 0.01 * largest
+
+
+@pytest.mark.parametrize(("plane", "sign"), [(0.0, 1), (np.pi, -1)])
+def test_statics_have_closed_forms_at_two_positions(plane: float, sign: int) -> None:
+    """Those of docs/drive.md, which are the largest loads of a revolution, too."""
+    first, second = np.radians((12.0, 5.0))
+    found = on_shafts(np.arange(360) * np.radians(1), (first, second), plane, 0.0, 1.2, 100.0)
+    force = 100.0 * np.sin(first + sign * second) / (1.2 * np.cos(first))
+    moments = 100.0 * np.sin(first) / np.cos(second), 100.0 * np.tan(second)
+    expected = ((force, 0.0), (0.0, moments[0]), (force, 0.0), (0.0, moments[1]))
+    for loads, (at_start, later) in zip(found[:4], expected, strict=True):
+        size = np.linalg.norm(loads, axis=1)
+        np.testing.assert_allclose(size[[0, 90]], [at_start, later], rtol=1e-12, atol=1e-12)
+        assert size.max() == pytest.approx(max(at_start, later), rel=1e-12)
+
+
+def test_an_order_of_the_speed_turns_the_inertia_of_the_whole_shaft() -> None:
+    """Order 3 of the driving torque, of equal joints: moment of inertia of all parts times 9 a omega^2, within 2 %."""
+    sections = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}
+    rows, mechanism = held(alpha=EIGHT, speed=500 * RPM, drive_shaft=drive_shaft(EIGHT, "W"), **sections)
+    with_orders(rows, speed=[(3, 0.004, 0.3)])
+    found = simulate_rows(rows, Options(max_refinements=0), "full", mechanism=mechanism)
+    assert found.results["status"][0] in SIMULATED
+    kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
+    of_lumps = rows.mass[0, kinds] * rows.at[0, kinds, 0] ** 2 + rows.inertia[0, kinds, 2]
+    drive = 2 * abs(order(3, found.histories["shafts"][0][:, 0, 5]))
+    assert drive == pytest.approx((rows.Js[0, -1] + of_lumps.sum()) * 9 * 0.004 * (500 * RPM) ** 2, rel=0.02)
 
 
 HARD = """

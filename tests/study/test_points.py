@@ -8,7 +8,7 @@ import pytest
 
 from tolstat import joint, sampling, study
 from tolstat.common import strict
-from tolstat.common.errors import InputError
+from tolstat.common.errors import Fault, InputError
 from tolstat.joint import operating
 from tolstat.study import points
 
@@ -173,15 +173,10 @@ def test_orders_of_speed_and_torque_are_read_and_kept():
             "speed.orders",
             "swings by up to 110 %",
         ),
-        ({"partner": {"position": "after", "alpha": "95 deg", "inertia": "1 kg*m^2"}}, "partner.alpha", "cannot turn"),
-        (
-            {"partner": {"position": "after", "alpha": "9 deg", "inertia": "1 kg*m^2", "stiffness": "1e4 N*m/rad"}},
-            "operation",
-            "torsional resonance of the intermediate shaft at 954.9 rpm",
-        ),
+        ({"alpha": "95 deg"}, "operation.alpha", "a Cardan joint cannot turn at 95 deg"),
     ],
 )
-def test_faults_of_orders_and_partner(given, place, found):
+def test_faults_of_angle_and_orders(given, place, found):
     with pytest.raises(InputError) as error:
         operation(**given)
     (fault,) = error.value.faults
@@ -190,12 +185,11 @@ def test_faults_of_orders_and_partner(given, place, found):
     assert fault.remedy
 
 
-def test_partner_is_kept_and_told():
-    partner = {"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2", "stiffness": "2e4 N*m/rad"}
-    point = points.Point("first", operation(partner=partner))
-    assert points.Point.of("first", json.loads(json.dumps(point.values()))).operation == point.operation
-    assert point.in_words.startswith("15 deg, 500 rpm, 100 N m, before a joint of 12 deg")
-    assert point.operation.partner.torsion(point.operation.speed, 2) == pytest.approx(0.0110874, rel=1e-4)
+def test_a_partner_is_told_what_to_write():
+    with pytest.raises(InputError) as error:
+        operation(partner={"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"})
+    remedy = "a drive shaft of two joints is simulated as one: give its joint 2, tube and spline in [shaft]"
+    assert error.value.faults == (Fault("study.toml: operation.partner", "unknown key", remedy),)
 
 
 ORDERED = ONE.replace('torque = "100 N*m"', 'torque = { mean = "100 N*m", orders = [{ n = 2, amplitude = "40 N*m" }] }')

@@ -46,7 +46,6 @@ ENTRY = '{ plus_minus = "0.05 mm", distribution = "uniform" }'
 ZONE = '{ zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }'
 FIT = '{ basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 ENTRY_OF_SPLINE = '"shaft.spline" = { plus_minus = 1.0, distribution = "uniform" }'
-PARTNER = 'partner = { position = "after", alpha = "12 deg", inertia = "0.02 kg*m^2" }'
 JOINTS = ("joint1", "joint2")
 
 
@@ -160,14 +159,6 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
         (
             WHOLE + '[output]\nresults = ["cross*.F_max"]\n',
             ["output.results[0]: 'cross*.F_max' selects nothing | did you mean '*.cross*.F_max'?"],
-        ),
-        (
-            WHOLE.replace("[shaft]", f"{PARTNER}\n[shaft]"),
-            ["operation.partner: stands beside [shaft], which simulates both joints | remove it, or [shaft]"],
-        ),
-        (
-            CASES + f'[[variant]]\nname = "x"\noperation.{PARTNER}\n',
-            ["variant.partner: stands beside [shaft], which simulates both joints | remove it, or [shaft]"],
         ),
         (
             WHOLE.replace("[operation]", f"{FREE}[operation]") + SPLINE,

@@ -15,12 +15,16 @@ from tests.support.naive import Z, joint_frames, turn
 
 
 class OnShafts(NamedTuple):
-    """Force (N) and moment (N m) across the input and output shaft, in axes of each shaft's bearings, (angles, 3)."""
+    """Force (N) and moment (N m) across the input and output shaft, in axes of each shaft's bearings, (angles, 3).
+
+    `couples` is the moment (N m) that the pins of each joint transmit, (angles, 2).
+    """
 
     input_force: np.ndarray
     input_moment: np.ndarray
     output_force: np.ndarray
     output_moment: np.ndarray
+    couples: np.ndarray
 
 
 def on_shafts(angles, alphas, plane, offset, length, torque) -> OnShafts:
@@ -41,4 +45,5 @@ def _at(theta, alphas, plane, offset, length, torque):
     moment1 = moment2 @ tube @ Z / (normal1 @ tube @ Z) * normal1
     force = np.cross(tube @ Z, moment1 - moment2) / length  # on the tube at joint 2, and the opposite at joint 1
     loads = force, -moment1, output.T @ -force, output.T @ moment2
-    return [load * (1.0, 1.0, 0.0) for load in loads]
+    couples = [np.linalg.norm(moment) for moment in (moment1, moment2)]
+    return *(load * (1.0, 1.0, 0.0) for load in loads), couples

@@ -14,8 +14,8 @@ from tolstat.common.mechanism import OBLIQUE, Mechanism, numbering
 
 MAX_STATIONS = 16
 """Maximum number of contact stations of a pin."""
-MAX_ORDERS = 48
-"""Maximum number of different orders of speed and torque: 16 of each, and those that come from a partner joint."""
+MAX_ORDERS = 32
+"""Maximum number of different orders of speed and torque: 16 of each."""
 
 
 @cache

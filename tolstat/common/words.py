@@ -14,6 +14,9 @@ _MEANT = {
     "spline, slip joint, length compensation": (
         'write shaft.axial = "free" under [joint], and where it sticks shaft.spline = { mu = 0.1, diameter = "40 mm" }'
     ),
+    "partner, second joint, intermediate shaft": (
+        "a drive shaft of two joints is simulated as one: give its joint 2, tube and spline in [shaft]"
+    ),
     "spider, trunnion, journal": "the cross has pins: cross and pin under [joint], pin1 to pin4 elsewhere",
     "yoke": "the arms of a yoke are arm under [joint], their holes hole1 to hole4 elsewhere",
     "roller, needle bearing": "this is bearing under [joint], with needles and needle_length",

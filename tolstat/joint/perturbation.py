@@ -23,9 +23,8 @@ from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.orders import Partner, add_partner, check_misalignment
 from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Spline
-from tolstat.joint.shaft import DriveShaft, Lumped
+from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
 
 Table = NDArray[np.void]
 
@@ -60,10 +59,6 @@ class Operation(Strict):
     """orders of the speed, { n, amplitude, phase } each"""
     torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
     """orders of the resisting torque, { n, amplitude, phase } each"""
-    partner: Partner | None = Field(
-        default=None, examples=[{"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"}]
-    )
-    """the other joint of a drive shaft; speed and torque are then those of the shaft's ends"""
 
     _split = model_validator(mode="before")(orders.split)
 
@@ -71,13 +66,6 @@ class Operation(Strict):
     def alphas(self) -> tuple[float, ...]:
         """Misalignment of each joint (rad)."""
         return (self.alpha,)
-
-    @model_validator(mode="after")
-    def _check_torsion(self) -> Operation:
-        if self.partner is not None:
-            numbers = (2, *(order.n for order in (*self.speed_orders, *self.torque_orders)))
-            self.partner.check_torsion(self.speed, max(numbers))
-        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -190,8 +178,6 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
     for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
         params[name] = value
-    if operation.partner is not None:
-        add_partner(operation.partner, params)
     factor = errors["material.E_factor"]
     params["k"] *= factor[:, None, None]
     for name in ("station_k1", "station_k2", "station_k3"):

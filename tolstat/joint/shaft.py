@@ -15,13 +15,19 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
-from tolstat.joint.orders import check_misalignment
 from tolstat.joint.sections import Length, Spline, Stiffness
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
 STEEL = 7850.0
 """Density of a tube that is given by its section, kg/m^3."""
+
+
+def check_misalignment(alpha: float) -> float:
+    """Refuse an angle at which a joint cannot turn, as a `PydanticCustomError`."""
+    if not abs(alpha) < np.pi / 2:
+        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
+    return alpha
 
 
 class Tube(Strict):

@@ -83,7 +83,6 @@ QUESTIONS = (
     Question("cases", "", "Compare the largest loads of the listed joints.", file="sweep"),
     Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
     Question("heat", "", "Estimate the power that friction takes, and the efficiency.", "open"),
-    Question("shafts", "Read", "Estimate which share of drive shafts exceeds limits.", "open", counted=True),
     Question("bearing_life", "Read", "Compute the life of the pins' bearings.", "open", "bearing_life.answer", True),
     Question("fatigue", "Read", "Compute failures of parts, equivalent loads and damage.", "open", "fatigue.answer"),
     Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),

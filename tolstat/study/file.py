@@ -7,7 +7,7 @@ be made, so that all faults are reported at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,8 +38,6 @@ SECTIONS = (
     *("fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
-OF_SHAFT = ("offset", "inertia", "stiffness")
-"""Keys of a partner that are the same at both joints of a drive shaft."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
 SCATTER = ("tolerances", "correlation", "errors")
@@ -170,7 +168,6 @@ def _check(file: Reading) -> None:
         _check_sections(file, file.sampling)
         _check_method(file, file.sampling)
         _check_points(file, file.sampling)
-    _check_shaft(file, [point for point in file.points or () if point.operation.partner])
     if file.output is not None:
         _check_output(file, file.output)
     if file.output is not None and file.solver is not None:
@@ -201,21 +198,6 @@ def _check_method(file: Reading, sampling: Sampling) -> None:
     joints = math.prod(axis.points for axis in file.sweep)
     if joints > MAX_ROWS:
         file.fault("sweep", f"gives {joints} joints", f"give at most {MAX_ROWS}")
-
-
-def _check_shaft(file: Reading, points: Sequence[Point]) -> None:
-    """Note that the points of the two joints of a drive shaft, the only ones with a partner, contradict each other."""
-    joints = {partner.position: (at.operation, partner) for at in points if (partner := at.operation.partner)}
-    if len(points) != 2 or len(joints) != 2:
-        return
-    (first, second), (later, earlier) = joints["after"], joints["before"]
-    pairs = {"alpha": ((first.alpha, second.alpha), (earlier.alpha, later.alpha))}
-    pairs |= {key: (getattr(first, key), getattr(later, key)) for key in ("speed", "torque")}
-    pairs |= {f"partner.{key}": (getattr(second, key), getattr(earlier, key)) for key in OF_SHAFT}
-    if differing := [key for key, (one, other) in pairs.items() if one != other]:
-        names = " and ".join(repr(point.name) for point in points)
-        found = f"{names} are the two joints of a shaft, and contradict each other in {', '.join(differing)}"
-        file.fault("operation", found, "give both the same, each alpha as the other's partner.alpha")
 
 
 def _check_points(file: Reading, sampling: Sampling) -> None:

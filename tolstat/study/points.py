@@ -22,7 +22,6 @@ from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
-from tolstat.joint.orders import Partner
 from tolstat.joint.sections import FREE, RIGID
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
@@ -57,7 +56,6 @@ class Point(NamedTuple):
         words += f", axial force {at.axial_force:.4g} N" if at.axial_force else ""
         for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
             words += f", {orders.in_words(given)} of {name}" if given else ""
-        words += f", {at.partner.in_words}" if at.partner else ""
         words += f", {at.shaft.in_words}" if isinstance(at, OperationOfShaft) else ""
         return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
@@ -68,7 +66,6 @@ class Point(NamedTuple):
         share = keys.pop("share")
         for key, order in ORDERS.items():
             keys[key] = tuple(order.model_construct(**wave) for wave in keys.get(key, ()))
-        keys["partner"] = Partner.model_construct(**keys["partner"]) if "partner" in keys else None
         kind: type[Operation] = OperationOfShaft if "shaft" in keys else Operation
         if "shaft" in keys:
             keys["shaft"] = DriveShaft.of(keys["shaft"])
@@ -79,10 +76,10 @@ class Point(NamedTuple):
 
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
         ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
-        ``partner`` and ``shaft`` with their keys in SI units.
+        ``shaft`` with its keys in SI units.
         """
         values = self.operation.model_dump()
-        values = {key: value for key, value in values.items() if key not in (*ORDERS, "partner") or value}
+        values = {key: value for key, value in values.items() if key not in ORDERS or value}
         return values | {"share": None if math.isnan(self.share) else self.share}
 
 
@@ -315,8 +312,6 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in unbalances):
         remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
         yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
-    for path in dict.fromkeys((*setting.path, "partner") for setting in of_shafts if setting.operation.partner):
-        yield path, "stands beside [shaft], which simulates both joints", "remove it, or [shaft]"
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"
         yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'

@@ -128,6 +128,32 @@ def test_an_array_of_another_shape(x, words):
         f.uniform(np.zeros((1, 1)))
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"workers": 0}, ["workers: 0 is no number of processes"]),
+        ({"workers": 1.5, "loads": ["cros1.F"]}, ["workers: 1.5 is no number", "'cros1.F' is no load"]),
+        ({"loads": []}, ["loads: is empty"]),
+        ({"study": {"joint": {}}}, ["study: dict is no study"]),
+        ({"study": ROOT / "tests/golden/schema.h5"}, ["schema.h5: is a result file (HDF5), and text is needed"]),
+    ],
+)
+def test_arguments_that_cannot_be_used_are_named(arguments, words):
+    with pytest.raises(InputError) as caught:
+        tolstat.function(**({"study": MAIN} | arguments))
+    assert len(caught.value.faults) == len(words)
+    for word, fault in zip(words, caught.value.faults, strict=True):
+        assert word in str(fault)
+
+
+def test_values_that_are_no_real_numbers_are_refused():
+    f = tolstat.function(study_of(TEXT), ["psi"])
+    x = np.zeros((2, len(f.names)))
+    for wrong in (x + 1j, x.astype(str).astype(object) + "x", pd.DataFrame(x + 1j, columns=f.names)):
+        with pytest.raises(InputError, match="has values that are no real numbers"):
+            f(wrong)
+
+
 @pytest.mark.parametrize("value", [1.5, -0.1, np.nan])
 def test_points_outside_the_unit_cube_are_refused(value):
     f = tolstat.function(study_of(TEXT), "psi")

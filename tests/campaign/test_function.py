@@ -77,7 +77,7 @@ def test_a_study_may_be_given_by_its_path():
 
 
 def test_faults():
-    with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
+    with pytest.raises(InputError, match=r"(?s)did you mean 'cross1.F'.*is no load") as caught:
         tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
     assert len(caught.value.faults) == 2
 

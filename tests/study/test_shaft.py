@@ -154,7 +154,7 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
         (
             WHOLE + '[limits]\n"*.F" = "900 N"\n"joint3.cross1.F" = "900 N"\njoint1.psi = 1e-3\n',
             ["limits.*.F: selects nothing | write the joint before it: joint1.*.F, or joint*.*.F for all joints",
-             "limits.joint3.cross1.F: selects nothing | did you mean 'joint2.cross1'?",
+             "limits.joint3.cross1.F: selects nothing | did you mean 'joint2.cross1.F'?",
              "limits.joint1.psi: selects nothing | did you mean 'psi'?"],
         ),
         (

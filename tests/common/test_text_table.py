@@ -104,7 +104,10 @@ def test_a_minus_of_a_spreadsheet_or_text_processor(path: Path) -> None:
         ("tilt,tilt\n1,2\n", ["1: tilt: is there twice"]),
         ("tilt,offset\n1,nan\ninf,1e400\n", ["2: offset: 'nan'", "3: tilt: 'inf'", "3: offset: '1e400'"]),
         ("tilt\nnan\n", ["2: tilt: 'nan' is no finite number"]),
-        ("tilt,offset\n1_0,١\nx,\n", ["2: tilt: '1_0'", "2: offset: '١'", "3: tilt: 'x'", "3: offset: has no number: the cell"]),
+        (
+            "tilt,offset\n1_0,١\nx,\n",
+            ["2: tilt: '1_0'", "2: offset: '١'", "3: tilt: 'x'", "3: offset: has no number: the cell"],
+        ),
         ("tilt,offset\nN,m\n1,2\n", ["2: tilt: [N] is no unit of it"]),
         ("\n# x\ntilt [mm],E_factor [m]\n1,2\n", ["3: tilt: [mm] is no unit", "3: E_factor: [m] is no unit"]),
         ('tilt,part\n1,"A\n2,B\n', ["1: has 0 rows", "2: cannot be split into cells: unexpected end of data"]),

@@ -328,7 +328,9 @@ def function(
         if not names:
             faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, every)))
     if not chosen and not faults:
-        faults.append(Fault("loads", "is empty", 'give names or patterns, such as ["cross*.F"]; None: those with limits'))
+        faults.append(
+            Fault("loads", "is empty", 'give names or patterns, such as ["cross*.F"]; None: those with limits')
+        )
     raise_all(faults)
     return Function(study, list(chosen), point, workers)
 

@@ -11,7 +11,7 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import deliver, print_json, print_warnings, progress, say, warn, work, write, write_frame
+from tolstat.cli._shared import deliver, echo, print_json, print_warnings, progress, say, warn, work, write, write_frame
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
@@ -57,7 +57,7 @@ def simulate(
     joints = library.parts.of_case(loaded, result)
     _deliver(result, joints.values() if as_json and joints.parts else {}, out, as_json)
     if joints.parts and not as_json:
-        typer.echo()
+        echo()
         deliver(joints, wide=False)
 
 
@@ -100,7 +100,7 @@ def _deliver(result: library.replays.CaseResult, facts: dict[str, Any], out: Pat
         print_json(summary)
     else:
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        typer.echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
+        echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
     state = library.tables.Status[str(summary["status"]).upper()]
     if state != library.tables.Status.OK:
         warn(f"warning: {state.label}: {library.tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
@@ -264,5 +264,5 @@ def show(
             library.drawings.lengths(joint, alphas),
         )
     (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix,))
-    typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])
+    echo(library.table.fitted(library.table.plain(rows), rows)[0])
     say(f"wrote {path}")

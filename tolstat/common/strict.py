@@ -280,7 +280,11 @@ def did_you_mean(word: str, allowed: Sequence[str], before: str = "", behind: st
         return remedy
     spelt = {name.lower(): name for name in allowed}
     close = difflib.get_close_matches(word.lower(), spelt, n=1)
-    return f"did you mean {before + spelt[close[0]] + behind!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    return (
+        f"did you mean {before + spelt[close[0]] + behind!r}?"
+        if close
+        else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    )
 
 
 def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, FieldInfo]:

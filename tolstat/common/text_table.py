@@ -191,7 +191,9 @@ class TextTable:
             (line, cells), name = self.rows[row], list(columns)[column]
             remedy = "give a number, without unit and thousands separators"
             cell = cells[columns[name]]
-            self.fault(line, name, f"{cell!r} is no finite number" if cell else "has no number: the cell is empty", remedy)
+            self.fault(
+                line, name, f"{cell!r} is no finite number" if cell else "has no number: the cell is empty", remedy
+            )
         if (number := len(self.rows) + len(self._refused)) < least:
             self.fault(self.head, "", f"has {number} rows below it", f"give at least {least}")
         return {

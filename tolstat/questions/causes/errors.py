@@ -17,13 +17,14 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.channels import histories_of
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.loads import FloatArray, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
 from tolstat.questions import shares
 from tolstat.questions.causes import lines, revolution
+from tolstat.questions.causes.shares import check_scatter
 from tolstat.questions.causes.simulation import simulate as simulate
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
@@ -34,8 +35,6 @@ SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
-MIN_JOINTS = 200
-"""Minimum number of valid joints."""
 MAX_JOINTS = sensitivity.MOST
 """Maximum number of joints (the first ones) for shares, and on either side of the tail: more add little, and
 a million joints with fifty errors do not fit into a gigabyte."""
@@ -320,12 +319,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], P
     study, independent = view.study, view.design.independent
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
-    if values.size < MIN_JOINTS:
-        what = "load on all limits" if load.name == ANY_LIMIT else load.name
-        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {MIN_JOINTS} joints or more")
-    if np.ptp(values) == 0:
-        same = f"has the same {load.name} in all joints: no error causes it"
-        raise shares.unusable(view, same, "name another load with --by")
+    check_scatter(view, load)
     columns = sampling.columns(study)
     components = sampling.components(study, view.errors(samples[:MAX_JOINTS], columns))
     names = [name for name, values_of_error in components.items() if np.ptp(values_of_error) > 0]

@@ -281,13 +281,6 @@ def test_the_line_to_change_may_be_a_fit(tmp_path, monkeypatch):
     assert {"made_lines_lines.csv", "made_lines_other_fits.csv"} <= {file.name for file in files}
 
 
-def by_clearance(params, *more, **others):
-    """The stand-in with a little more load by the clearance."""
-    simulation = stand_in(params, *more, **others)
-    simulation.results["F_max"][:, 0] += 1e4 * params["clearance"][:, 0]
-    return simulation
-
-
 @pytest.mark.usefixtures("quick")
 def test_a_study_with_a_fit_only_has_no_line_of_a_width(tmp_path):
     head, rest = FITTED.split("[tolerances]\n")

@@ -110,6 +110,10 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
              "shaft.alhpa: unknown key | did you mean 'alpha'?"],
         ),
         (
+            HEAD + SPLINE.replace("40 mm", "80 mm") + SCATTER + RANDOM,
+            ["shaft: spline.diameter = 80 mm is larger than tube.diameter = 76 mm | give the pitch diameter of the spline"],
+        ),
+        (
             HEAD.replace('"6 deg"', '"90 deg"') + SCATTER + RANDOM,
             ["shaft.alpha: a Cardan joint cannot turn at 90 deg | give less than 90 deg"],
         ),

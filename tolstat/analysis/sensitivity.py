@@ -205,9 +205,9 @@ def _with_ends(
     half, known = z * _error(influence, chance), np.isfinite(estimate)
     of_sum = z * float(_error(influence[:, known].sum(axis=1), float(chance[known].sum())))
     additive = float(estimate[known].sum())
-    ends = (float(np.clip(additive + sign * of_sum, 0, 1)) for sign in (-1.0, 1.0))
-    within = (np.clip(estimate + sign * half, 0, 1) for sign in (-1.0, 1.0))
-    return FirstOrder(estimate, *within, float(e.var()), (additive, *ends))
+    low, high = (float(np.clip(additive + sign * of_sum, 0, 1)) for sign in (-1.0, 1.0))
+    lower, upper = (np.clip(estimate + sign * half, 0, 1) for sign in (-1.0, 1.0))
+    return FirstOrder(estimate, lower, upper, float(e.var()), (additive, low, high))
 
 
 def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:

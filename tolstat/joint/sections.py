@@ -37,6 +37,14 @@ def _poisson(nu: float) -> float:
     return nu
 
 
+def _pitch(diameter: float) -> float:
+    if not SMALLEST_SPLINE <= diameter <= LARGEST_SPLINE:
+        raise refuse(
+            "{diameter} is no pitch diameter of a spline", 'check its unit; write for example "40 mm"', "diameter"
+        )
+    return diameter
+
+
 def _friction(mu: float) -> float:
     if mu > 1.0:
         raise refuse("{mu} is above 1", "give the coefficient of friction, such as 0.05", "mu")
@@ -59,6 +67,8 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 
 LEAST_E = 1e9
 """Young's modulus (Pa) below that of any metal."""
+SMALLEST_SPLINE, LARGEST_SPLINE = 1e-3, 1.0
+"""Pitch diameters of splines, m, beyond which a unit is wrong."""
 LARGEST_GRADE = 4.0
 """Largest balance quality grade of ISO 21940-11, m/s."""
 Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterValidator(_body)]
@@ -246,7 +256,7 @@ class Spline(Strict):
 
     mu: Annotated[Ratio, AfterValidator(_friction)] = Field(examples=[0.1])
     """coefficient of friction of its flanks"""
-    diameter: Length = Field(examples=["40 mm"])
+    diameter: Annotated[Length, AfterValidator(_pitch)] = Field(examples=["40 mm"])
     """pitch diameter d"""
 
     def largest_force(self, torque: Array) -> Array:

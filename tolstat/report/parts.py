@@ -98,7 +98,7 @@ def parts(
     if not limits:
         return [found]
     names = {labels[k]: [name for name, ratio in zip(values, use[:, k], strict=True) if ratio > 1.0] for k in nearest}
-    lacking = [labels[k] for k in np.flatnonzero(np.isnan(use[~np.isnan(limit[:, 0])]).any(axis=0))]
+    lacking = [labels[k] for k in np.flatnonzero(np.isnan(use[~np.isnan(limit[:, 0])]).any(axis=0)).tolist()]
     return [Sentence(_verdict(names, lacking), "lead"), found]
 
 

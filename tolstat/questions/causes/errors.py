@@ -31,6 +31,8 @@ from tolstat.store.view import View
 
 SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
+MOST_WIDE = 90.0
+"""Width of an interval of a share, %, above which it says nothing."""
 SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
@@ -231,8 +233,8 @@ def _notes(of_errors: Indices, command: str, shown: int) -> list[str]:
     facts, rows = of_errors
     unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
     additive, low, high = (100 * facts[f"additive{end}"] for end in ENDS)
-    alone = f"errors alone explain {additive:.0f} %{'' if math.isnan(low) else f' ({low:.0f} .. {high:.0f} %)'}"
-    alone += " of the variance"
+    ends = "" if math.isnan(low) else f" ({low:.0f} .. {high:.0f} %{', too few joints' * (high - low > MOST_WIDE)})"
+    alone = f"errors alone explain {additive:.0f} %{ends} of the variance"
     if number := len(rows) - len(seen := _seen(rows, shown)):
         rest = additive - 100 * sum(row["first"] for row in seen)
         alone += f", of which the {number} not shown {rest:+.0f} % (without effect they scatter about 0 %)"

@@ -111,7 +111,8 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
         ),
         (
             HEAD + SPLINE.replace("40 mm", "80 mm") + SCATTER + RANDOM,
-            ["shaft: spline.diameter = 80 mm is larger than tube.diameter = 76 mm | give the pitch diameter of the spline"],
+            ["shaft: spline.diameter = 80 mm is larger than tube.diameter = 76 mm | "
+             "give the pitch diameter of the spline"],
         ),
         (
             HEAD.replace('"6 deg"', '"90 deg"') + SCATTER + RANDOM,

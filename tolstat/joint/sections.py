@@ -15,7 +15,7 @@ from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
-from tolstat.joint.material import Array
+from tolstat.joint.spline import Coefficient, Spline
 
 Length = Annotated[units.Length, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -37,20 +37,6 @@ def _poisson(nu: float) -> float:
     return nu
 
 
-def _pitch(diameter: float) -> float:
-    if not SMALLEST_SPLINE <= diameter <= LARGEST_SPLINE:
-        raise refuse(
-            "{diameter} is no pitch diameter of a spline", 'check its unit; write for example "40 mm"', "diameter"
-        )
-    return diameter
-
-
-def _friction(mu: float) -> float:
-    if mu > 1.0:
-        raise refuse("{mu} is above 1", "give the coefficient of friction, such as 0.05", "mu")
-    return mu
-
-
 def _grade(grade: float) -> float:
     if grade > LARGEST_GRADE:
         raise refuse("{grade} is above G 4000, the largest grade", 'write its number in mm/s: "16 mm/s"', "grade")
@@ -67,8 +53,6 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 
 LEAST_E = 1e9
 """Young's modulus (Pa) below that of any metal."""
-SMALLEST_SPLINE, LARGEST_SPLINE = 1e-3, 1.0
-"""Pitch diameters of splines, m, beyond which a unit is wrong."""
 LARGEST_GRADE = 4.0
 """Largest balance quality grade of ISO 21940-11, m/s."""
 Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterValidator(_body)]
@@ -204,7 +188,7 @@ class Thrust(Strict):
 class Friction(Strict):
     """Friction of the pins in their bearings."""
 
-    mu: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
+    mu: Coefficient | None = Field(default=None, examples=[0.05])
     """coefficient of friction, up to 1: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15; when left out: no
     friction"""
     radius: Length | None = Field(default=None, examples=["12.5 mm"])
@@ -249,19 +233,6 @@ class Unbalance(Strict):
         if self.grade is None or self.mass is None or self.speed is None:
             return self.amount or 0.0
         return self.grade * self.mass / self.speed
-
-
-class Spline(Strict):
-    """Spline of the output shaft, which sticks with any axial force up to 2 mu T/d, T the torque of the joint."""
-
-    mu: Annotated[Ratio, AfterValidator(_friction)] = Field(examples=[0.1])
-    """coefficient of friction of its flanks"""
-    diameter: Annotated[Length, AfterValidator(_pitch)] = Field(examples=["40 mm"])
-    """pitch diameter d"""
-
-    def largest_force(self, torque: Array) -> Array:
-        """Axial force (N) that its friction can hold at a torque (N m): 2 mu T/d."""
-        return abs(torque) * (2.0 * self.mu / self.diameter)
 
 
 class Shaft(Strict):

@@ -16,7 +16,8 @@ from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
 from tolstat.joint.orders import check_misalignment
-from tolstat.joint.sections import Length, Spline, Stiffness
+from tolstat.joint.sections import Length, Stiffness
+from tolstat.joint.spline import Spline
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""

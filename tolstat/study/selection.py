@@ -182,9 +182,8 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     known = [name for name in every if _matches(feature, name)]
     if not known:
         rest = pattern.partition(".")[2]
-        behind = f".{key}" if key else ""
-        is_rest = rest in every or select(rest, names)
-        return f"did you mean {rest!r}?" if is_rest else did_you_mean(feature, every, behind=behind)
+        is_whole = rest in every or select(rest, names)
+        return f"did you mean {rest!r}?" if is_whole else did_you_mean(feature, every, "", pattern[len(feature) :])
     return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]], f"{feature}.")
 
 

@@ -244,7 +244,7 @@ def test_the_sentence_says_what_the_largest_error_is_a_bound_of(tmp_path):
         several = verification.together([view.verification, view.verification])  # two operating points, the same joints
     assert "estimated on 29 joints from half the step and smaller tolerances: F median 0.0e+00, largest" in words
     assert "; at least 90 % of the production has smaller ones than the largest (confidence 95 %)" in words
-    assert "; largest, of the 29 joints nearest to limits: F 0.0e+00" in words
+    assert "; largest of the 29 joints nearest to limits: F 0.0e+00" in words
     assert "90 % of the production" in question.error_note(several, CARDAN)
     assert "of the production" not in question.error_note(several, CARDAN, is_sample=False)
 

@@ -124,8 +124,9 @@ def error_of_view(view: View, checks: Verification) -> str:
     if near is None or not known:
         return words
     largest = ", ".join(f"{kind} {row['worst']:.1e}" for kind, row in known.items())
-    how = "" if basis(near).partition(" ")[0] in words else f", {basis(near).partition(' ')[0]}"
-    return f"{words}; largest{how}, of the {len(near.rows)} joints nearest to limits: {largest}"
+    how = basis(near).partition(" ")[0]
+    how = "" if how in words else f" ({how})"
+    return f"{words}; largest of the {len(near.rows)} joints nearest to limits{how}: {largest}"
 
 
 def _known(verification: Verification, mechanism: Mechanism, limits: Iterable[str]) -> dict[str, Row]:

@@ -98,6 +98,24 @@ def test_few_joints_give_an_error_without_effect_no_share_on_average_and_without
     assert share_explained(x, loads[0]).mean() > 0.1
 
 
+def test_a_load_that_scatters_more_at_large_errors_has_no_share_on_average_and_by_degrees_of_freedom_it_has():
+    """The mean of the load is zero at every value of every error; its scatter grows with five of them."""
+    rng, leaving_out, by_degrees = np.random.default_rng(51), [], []
+    for _ in range(100):
+        x = rng.standard_normal((200, 8))
+        y = rng.standard_normal(200) * (x[:, :5] ** 4).sum(axis=1)
+        found = sensitivity.first_order(x, y)
+        low, high = found.additive[1:]
+        leaving_out.append(found.additive[0])
+        assert found.additive[0] == pytest.approx(found.estimate.sum())
+        assert low <= max(found.additive[0], 0.0) <= high
+        e = y - y.mean()
+        inside = [np.sum((e - sensitivity._fit(column, e).mean) ** 2) / (199 - 8) for column in x.T]
+        by_degrees.append(np.sum(1.0 - np.array(inside) / e.var(ddof=1)))
+    assert abs(np.mean(leaving_out)) < 0.05
+    assert np.mean(by_degrees) > 0.16
+
+
 def test_errors_of_few_values_and_of_one_value():
     rng = np.random.default_rng(8)
     x = np.column_stack([rng.integers(0, 2, 1000), rng.standard_normal(1000), np.full(1000, 3.0)])

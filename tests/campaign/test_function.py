@@ -77,7 +77,7 @@ def test_a_study_may_be_given_by_its_path():
 
 
 def test_faults():
-    with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
+    with pytest.raises(InputError, match=r"(?s)did you mean 'cross1.F'.*is no load") as caught:
         tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
     assert len(caught.value.faults) == 2
 
@@ -126,6 +126,32 @@ def test_an_array_of_another_shape(x, words):
         f(x)
     with pytest.raises(ValueError, match=r"each of f\.cube_names is needed"):
         f.uniform(np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"workers": 0}, ["workers: 0 is no number of processes"]),
+        ({"workers": 1.5, "loads": ["cros1.F"]}, ["workers: 1.5 is no number", "'cros1.F' is no load"]),
+        ({"loads": []}, ["loads: is empty"]),
+        ({"study": {"joint": {}}}, ["study: dict is no study"]),
+        ({"study": ROOT / "tests/golden/schema.h5"}, ["schema.h5: is a result file (HDF5), and text is needed"]),
+    ],
+)
+def test_arguments_that_cannot_be_used_are_named(arguments, words):
+    with pytest.raises(InputError) as caught:
+        tolstat.function(**({"study": MAIN} | arguments))
+    assert len(caught.value.faults) == len(words)
+    for word, fault in zip(words, caught.value.faults, strict=True):
+        assert word in str(fault)
+
+
+def test_values_that_are_no_real_numbers_are_refused():
+    f = tolstat.function(study_of(TEXT), ["psi"])
+    x = np.zeros((2, len(f.names)))
+    for wrong in (x + 1j, x.astype(str).astype(object) + "x", pd.DataFrame(x + 1j, columns=f.names)):
+        with pytest.raises(InputError, match="has values that are no real numbers"):
+            f(wrong)
 
 
 @pytest.mark.parametrize("value", [1.5, -0.1, np.nan])

@@ -62,7 +62,7 @@ def test_columns_that_are_no_numbers_or_of_other_lengths():
     assert faults_of(twice) == [("have more than one pin1.tilt_t", "give one")]
     values = mapping(FRAME) | {"pin1.offset_t": [1.0], "hole2.diameter": ["a", "b"], "operation.torque": 5.0}
     assert faults_of(values) == [
-        ("has no numbers", "give a number for each joint, in SI units"),
+        ("has values that are no real numbers", "give a number for each joint and error, in SI units"),
         ("has shape (1,)", "give one dimension of length 2"),
         ("has shape (1,)", "give one dimension of length 2"),
     ]

@@ -31,6 +31,7 @@ def test_a_rule_is_read() -> None:
     single = Limit("cross1.F", ("cross1.F",), (700.0,))
     assert stop_rule.parse("P(cross1.F > 0.7 kN) width < 0.002", {}, CARDAN)[1:] == (single, 0.002)
     assert stop_rule.parse(" P( psi>1e-3 )width<0.5 ", {}, CARDAN)[1:] == (Limit("psi", ("psi",), (1e-3,)), 0.5)
+    assert stop_rule.parse("P(psi>1e-3) < 5 %", {}, CARDAN, "").bound == 0.05
     several = stop_rule.parse("P(*.F > 700 N) width < 0.01", {}, CARDAN).limit
     assert several.loads == tuple(name for name in LOADS if name.endswith(".F"))
     assert (several.level, several.unit, str(several)) == (700.0, "N", "*.F > 700 N")
@@ -55,6 +56,8 @@ def test_a_joint_is_above_a_limit_of_several_loads_if_one_of_them_is() -> None:
     ("text", "words"),
     [
         ("often", ["'often' is not a rule", 'write --until "P(cross1.F > 700 N) width < 0.01"']),
+        ("< 5 %", ["'< 5 %' is not a rule: it says no limit", 'write --until "P(any limit) width < 5 %"']),
+        ("P(psi > 1e-3) width < 5 mm", ["width 5 mm is not between 0 and 1"]),
         ("P(cros1.F > 700 N) width < 2", ["did you mean 'cross1.F'?", "width 2 is not between 0 and 1"]),
         ("P(cross1.F > 700 mm) width < few", ["'700 mm' cannot be a value in N", "width few is not"]),
         ("P(fork1.T > 40) width < 0.1", ["'40' has no unit"]),

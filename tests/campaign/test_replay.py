@@ -21,7 +21,8 @@ from tolstat.common.columns import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.questions.causes.worst import joint_rows, largest_errors
+from tolstat.display.answer import Sentence
+from tolstat.questions.causes.worst import NOTES, joint_rows, ordered, worst
 from tolstat.store import ResultFile, Writer, recorded
 
 HEAD = """
@@ -157,8 +158,31 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
         for part in "tz":
             z = errors[f"hole2.offset_{part}"][joint["row"]] / 1e-4
             assert joint[f"hole2.offset_radial_{part}"] == pytest.approx(z, abs=1e-9)
-        sizes = [abs(score) for _, score in largest_errors(joint)]
+        first = joint["raised_by"].split(", ") if joint["raised_by"] else []
+        sizes = [abs(score) for _, score in ordered(joint)[len(first) :]]
         assert sizes == sorted(sizes, reverse=True)
+
+
+def test_errors_that_move_the_load_come_before_larger_ones(tmp_path: Path) -> None:
+    """The load follows one error to its positive side, and another one to both sides; of few joints none is known."""
+    for n, known in ((400, True), (20, False)):
+        text = synthetic.WHOLE.replace("n = 60", f"n = {n}").replace('"pin*.offset_t"', '"pin*.offset_[tz]"')
+        path = synthetic.store(tmp_path, text, f"of_{n}", simulated=0)
+        with Writer.open(path) as store:
+            results, errors = synthetic.results(n + 1), store.errors()
+            results["F_max"][:, 0] = 640.0 + 1e6 * (errors["pin1.offset_t"] + np.abs(errors["pin3.offset_z"]))
+            store.write(np.arange(n + 1), Simulation(results, {}))
+        with ResultFile.open(path) as store:
+            view = store.view()
+            found, answer = joint_rows(view, "cross1.F", 8), worst(view, "cross1.F", 8)
+        assert any(joint["raised_by"] for joint in found) == known
+        notes = [part.text for part in answer.parts if isinstance(part, Sentence)]
+        assert notes[0] == NOTES[known]
+        for joint in found if known else ():
+            first = joint["raised_by"].split(", ")
+            assert set(first) == {"pin1.offset_t", "pin3.offset_z"}
+            assert [name for name, _ in ordered(joint)[:2]] == first
+            assert joint["pin1.offset_t"] > 0.0
 
 
 def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from tests.study.test_fuzz import FUZZ
 from tolstat.common.errors import InputError
 from tolstat.common.text_table import SHOWN, TextTable
+from tolstat.common.units import to_si
 
 SI = {"tilt": "rad", "offset": "m", "E_factor": "1"}
 
@@ -67,10 +68,21 @@ def test_columns_in_any_order_and_units(path: Path) -> None:
     for text in (
         "offset, tilt ,E_factor,row\num,deg,,1\n10,180,1,7\n20,90,2,8\n",
         "offset [um];tilt [°];E_factor [%];row\n10;180;100;7\n20;90;200;8\n",
+        "offset (um);tilt (°);E_factor (%);row (no. of it)\n10;180;100;7\n20;90;200;8\n",
+        "offset;tilt;E_factor;row\n(um);[°];(%);\n10;180;100;7\n20;90;200;8\n",
     ):
         found = read(path, text)
         expected = [[np.pi, np.pi / 2], [1e-5, 2e-5], [1.0, 2.0]]
         np.testing.assert_allclose([found[name] for name in SI], expected, rtol=1e-15)
+
+
+def test_a_minus_of_a_spreadsheet_or_text_processor(path: Path) -> None:
+    assert read(path, "tilt;offset\n−0,5;–1e−3\n")["tilt"] == [-0.5]
+    assert read(path, "tilt;offset\n−0,5;–1e−3\n")["offset"] == [-1e-3]
+    assert refused(path, "tilt,offset\n—1,1–2\n")[0].startswith("2: tilt: '—1' is no finite number")
+    with pytest.raises(ValueError, match="is not a number") as caught:
+        to_si("−0.1 mm", "m")
+    assert caught.value.context["remedy"] == 'write a hyphen for minus: "-0.1 mm"'
 
 
 @pytest.mark.parametrize(
@@ -92,7 +104,10 @@ def test_columns_in_any_order_and_units(path: Path) -> None:
         ("tilt,tilt\n1,2\n", ["1: tilt: is there twice"]),
         ("tilt,offset\n1,nan\ninf,1e400\n", ["2: offset: 'nan'", "3: tilt: 'inf'", "3: offset: '1e400'"]),
         ("tilt\nnan\n", ["2: tilt: 'nan' is no finite number"]),
-        ("tilt,offset\n1_0,١\nx,\n", ["2: tilt: '1_0'", "2: offset: '١'", "3: tilt: 'x'", "3: offset: ''"]),
+        (
+            "tilt,offset\n1_0,١\nx,\n",
+            ["2: tilt: '1_0'", "2: offset: '١'", "3: tilt: 'x'", "3: offset: has no number: the cell"],
+        ),
         ("tilt,offset\nN,m\n1,2\n", ["2: tilt: [N] is no unit of it"]),
         ("\n# x\ntilt [mm],E_factor [m]\n1,2\n", ["3: tilt: [mm] is no unit", "3: E_factor: [m] is no unit"]),
         ('tilt,part\n1,"A\n2,B\n', ["1: has 0 rows", "2: cannot be split into cells: unexpected end of data"]),

@@ -133,8 +133,17 @@ def test_an_index_of_a_handful_of_joints_has_no_interval_and_a_note():
     cpk = capability_of(loads, np.ones(10), 2.0).cpk
     assert np.isfinite(cpk.estimate)
     assert np.isnan([cpk.lower, cpk.upper]).all()
-    for n, told in ((8, True), (64, False)):
-        assert ("no interval of Cpk where" in notes_of(view(limits={"cross1.F": 700.0}, n=n))) == told
+
+
+@pytest.mark.parametrize(("n", "interval"), [(8, "-"), (65, "below "), (1001, "0.00 .. ")])
+def test_an_index_that_few_joints_do_not_tell_is_not_printed(n, interval):
+    made = view(limits={"cross1.F": 700.0}, n=n)
+    row = limits_of(made).iloc[0].to_dict()
+    assert np.isnan([row["cpk"], row["cpk_normal"]]).all() == (n < 1000)
+    column = next(column for column in question.LIMITS if column.head == "interval of Cpk")
+    assert column.cell(row).startswith(interval)
+    words = "Cpk needs 1000 valid joints, its lower end 3244; fewer tell at most its upper end"
+    assert (words in notes_of(made)) == (n < 1000)
 
 
 def test_unresolved_joints_lower_the_yield():

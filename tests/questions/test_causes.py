@@ -113,8 +113,10 @@ def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_p
 def test_what_has_no_causes_is_refused(tmp_path, path):
     few = synthetic.store(tmp_path)
     sweep = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
+    before = few.read_bytes()
     for arguments, text in (
         ((few,), "60 joints with a valid load on all limits"),
+        ((few, "--run", "--budget", "9 s"), f"200 are needed: tolstat extend {few} --n 200"),  # before it simulates
         ((sweep,), "not drawn from tolerances"),
         ((path, "--by", "cross9.F"), "is not a load"),
     ):
@@ -122,6 +124,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
         assert done.exit_code == 2
         assert text in done.stderr
         assert "hint:" in done.stderr
+    assert few.read_bytes() == before
 
 
 PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace("offset_t", "offset_[tz]")

@@ -240,6 +240,12 @@ def test_what_cannot_be_changed_is_refused(tmp_path: Path) -> None:
         answer(path, ["operation.alpha=15 deg"])
     with pytest.raises(InputError, match="changes no joint"):
         simulated(path, ["sampling.seed=4"])
+    with pytest.raises(InputError, match=r"--budget: 0 s were over before a joint with the change was simulated"):
+        simulated(path, budget=0.0)
+    for text, words in (("5", "'5' has no unit"), ("5 parsecs", "cannot be a value in s"), ("-1 s", "is not a time")):
+        told = call("change", path, "--set", NARROW[0], "--budget", text).stderr
+        assert words in told
+        assert 'hint: write --budget "5 min", "90 s" or "2 h"' in told
     swept = synthetic.store(tmp_path, synthetic.SWEEP, "swept")
     with pytest.raises(StoreError):
         simulated(swept)

@@ -190,6 +190,26 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
         question.compare(one.view(), one.view())
 
 
+def test_loads_by_a_pattern_and_where_test_and_interval_disagree(tmp_path):
+    """Five pairs of 64 above a limit in B alone: p = 2^-4 of the exact test, and an interval that excludes zero."""
+    a = campaign(tmp_path, "a", n=64, factor=0.0)
+    b = synthetic.store(tmp_path, synthetic.STUDY.replace("n = 60", "n = 64"), "b", simulated=0)
+    with Writer.open(b) as store:
+        results = synthetic.results(store.n)
+        results["F_max"][:, 0] = np.where(np.arange(store.n) % 12 == 5, 900.0, 640.0)
+        store.write(np.arange(store.n), Simulation(results, {}))
+    with ResultFile.open(a) as one, ResultFile.open(b) as other:
+        answer = question.compare(one.view(), other.view(), ["cross[12].T", "psi"])
+    assert answer.frame("loads")["load"].unique().tolist() == ["cross1.T", "cross2.T", "psi"]
+    row = answer.frame("shares").set_index("load").loc["cross1.F"]
+    assert (row["only_a"], row["only_b"], row["p"]) == (0, 5, 0.0625)
+    assert row["lower"] > 0.0
+    told = [note for note in notes_of(answer) if "disagree at" in note]
+    assert told == ["they disagree at cross1.F > 700 N and 1 more: whether there is a difference, the exact test says"]
+    pairs = {row["row"] for row in answer.frame("switched").to_dict("records")}
+    assert f"{len(pairs)} pairs have only one joint above a limit; " in "\n".join(notes_of(answer))
+
+
 def test_loads_that_were_not_asked_for_need_not_be_in_both_files(tmp_path):
     kept = "[output]\nresults = ['fork*.F_max']\n"
     text = synthetic.WHOLE.partition("[limits]")[0] + kept + '[limits]\n"fork1.F" = "700 N"\n'

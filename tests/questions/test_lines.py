@@ -284,7 +284,8 @@ def test_the_line_to_change_may_be_a_fit(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("quick")
 def test_a_study_with_a_fit_only_has_no_line_of_a_width(tmp_path):
     head, rest = FITTED.split("[tolerances]\n")
-    path = made(tmp_path, f"{head}[tolerances]\n{FIT}\n\n[sampling]{rest.split('[sampling]')[1]}")
+    text = f"{head}[tolerances]\n{FIT}\n\n[sampling]{rest.split('[sampling]')[1]}"
+    path = made(tmp_path, text, by_clearance)
     simulated(path)
     answer = evaluated(path)
     assert {row["line"] for row in answer.tables["lines"].rows} == {"fit F8/h6"}

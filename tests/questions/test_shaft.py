@@ -83,7 +83,7 @@ def test_a_shaft_has_no_rating_where_one_of_its_bearings_frets(view):
     assert np.isnan(lives.hours).sum() == lives.hours.size - rated.size
     assert lives.unrated == 39
     (verdict,) = bearing_life.life_verdicts(view((15.0, 2.0)), np.nan)
-    assert "a bearing of every joint swings by less than" in verdict.words
+    assert "in every joint a bearing of joint2 swings by less than" in verdict.words
 
 
 def test_no_reversals_are_counted(of_study):

@@ -72,7 +72,7 @@ def test_joints_beyond_limits(tmp_path: Path) -> None:
     answer = shown(study_of(tmp_path), [700.0, 600.0, 600.0], [300.0, 30e3, 300.0], [OK, OK, FAILED])
     (told,) = answer.values()["sentences"]
     assert told["text"] == (
-        "Beyond a limit: 2 of 3 joints: B (life of all four), A (cross1.F); 1 without a valid load or a rating."
+        "Beyond a limit: 2 of 3 joints: B (life of all four), A (cross1.F); 1 without a valid load or a rating: C."
     )
     first, *rows = cells(answer)
     assert first == ["load or life", "limit", "A", "B", "C"]
@@ -92,6 +92,7 @@ def test_of_many_joints_those_nearest_to_a_limit_stand_side_by_side(tmp_path: Pa
     (told,) = answer.values()["sentences"]
     assert told["text"] == "Beyond a limit: 3 of 6 joints: D (cross1.F), B (cross1.F), F (cross1.F)."
     assert cells(answer)[0][2:] == ["D", "B", "F"]
+    assert answer.tables["joints"].title == "Loads and lives of 3 of 6 joints, nearest to a limit first"
     assert len(answer.tables["joints"].rows) == 6 * 7
     more = shown(study_of(tmp_path), [700.0] * 5, [300.0] * 5, [OK] * 5).values()["sentences"][0]["text"]
     assert more == "Beyond a limit: 5 of 5 joints: A (cross1.F), B (cross1.F), C (cross1.F) and others."
@@ -138,7 +139,7 @@ def test_loads_with_limits_stand_before_those_of_the_shafts() -> None:
 @pytest.mark.slow
 def test_a_case_evaluate_and_simulate_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A measured joint has the same loads and lives by each way; zones of the study do not matter."""
-    (tmp_path / "cross.csv").write_text("pin1.tilt_z;pin1.offset_t\ndeg;mm\n0,21;0,03\n", encoding="utf-8")
+    (tmp_path / "cross.csv").write_text("part;pin1.tilt_z;pin1.offset_t\n;deg;mm\nA7;0,21;0,03\n", encoding="utf-8")
     for name, text in (("drawn", HEAD + LIMITS + DRAWN), ("cases", HEAD + LIMITS + CASES), ("case", HEAD + LIMITS)):
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
     run(load(tmp_path / "cases.toml"), tmp_path / "a.h5", workers=1)
@@ -153,7 +154,9 @@ def test_a_case_evaluate_and_simulate_agree(tmp_path: Path, capsys: pytest.Captu
     assert f"{values['life of all four']:.4g} h" in printed
     with (tmp_path / "y.csv").open(encoding="utf-8") as stream:
         _, row = csv.DictReader(stream)
-    assert [float(row[name]) for name in ("cross1.F", "cross2.F")] == [values["cross1.F"], values["cross2.F"]]
+    assert row["joint"] == "A7"
+    for name in ("cross1.F", "cross2.F", "life of pin1", "life of all four"):
+        assert float(row[name]) == values[name]
     simulate(tmp_path / "case.toml", table=table, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["max"]["cross1.F"]["joint"] == values["cross1.F"]

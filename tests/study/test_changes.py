@@ -52,6 +52,11 @@ def changed(*settings: str, text: str = TEXT) -> Study:
             '"22 mm", distribution = "normal", cpk = 1.0',
             '"22 mm", distribution = "normal", cpk = 1.2',
         ),
+        (
+            "'*.tilt_*'.cpk=1.2",
+            '"22 mm", distribution = "normal", cpk = 1.0',
+            '"22 mm", distribution = "normal", cpk = 1.2',
+        ),
         ("tolerances.hole*.tilt_t.cpk = 1.2", 'nominal = "22 mm", distribution = "normal", cpk = 1.0', None),
         ("operation.alpha=12 deg", 'alpha = "15 deg"', 'alpha = "12 deg"'),
         ("errors.pin2.tilt_z=0.2 deg", '"pin2.tilt_z" = "0.1 deg"', '"pin2.tilt_z" = "0.2 deg"'),

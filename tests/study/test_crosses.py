@@ -25,20 +25,37 @@ def table(folder: Path, text: str) -> Path:
 
 def test_columns_that_are_there_are_read_and_the_others_counted_once(tmp_path: Path) -> None:
     path = table(tmp_path, CROSS)
-    columns, lines, notes = crosses.read(path, CARDAN, UNITS, {})
-    assert lines == [3]
+    columns, labels, named, notes = crosses.read(path, CARDAN, UNITS, {})
+    assert (labels, named) == (["A7"], "part")
     assert columns.keys() == {"pin1.tilt_z", "pin1.offset_t"}
     np.testing.assert_allclose(columns["pin1.tilt_z"], np.radians([0.21]), rtol=1e-15)
     np.testing.assert_allclose(columns["pin1.offset_t"], [3e-5], rtol=1e-15)
     assert notes == [
-        f"{path}: columns left out: part, 1 of results",
+        f"{path}: columns left out: 1 of results",
         f"{path}: 46 errors not measured: taken as nominal",
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "labels", "named"),
+    [
+        ("grade,Name,pin1.tilt_z\n1,A7,0\n1,B8,0\n", ["A7", "B8"], "Name"),
+        ("row,pin1.tilt_z\n4,0\n7,0\n", ["row 4", "row 7"], "row"),
+        ("part,pin1.tilt_z\nA,0\n,0\nA,0\n", ["A (line 2)", "line 3", "A (line 4)"], "part"),
+        ("pin1.tilt_z,grade\n0,1\n0,2\n", ["line 2", "line 3"], ""),
+    ],
+)
+def test_joints_are_called_by_the_column_that_names_them(
+    tmp_path: Path, text: str, labels: list[str], named: str
+) -> None:
+    found = crosses.read(table(tmp_path, text), CARDAN, UNITS, {})
+    assert (found.labels, found.named) == (labels, named)
+    assert not any(named and named in note for note in found.notes)
+
+
 def test_errors_that_the_study_gives_are_told_from_nominal_ones(tmp_path: Path) -> None:
     given = {"pin4.tilt_z": 0.01, "pin1.tilt_z": 0.01}
-    notes = crosses.read(table(tmp_path, CROSS), CARDAN, UNITS, given)[2]
+    notes = crosses.read(table(tmp_path, CROSS), CARDAN, UNITS, given).notes
     assert notes[-1].endswith("46 errors not measured: taken as nominal, but for 1 of [errors]")
 
 
@@ -53,9 +70,9 @@ def test_of_one_joint_the_errors_of_its_parts_are_counted(tmp_path: Path) -> Non
     """Four pins and four holes have five positions and angles and a diameter each; a clearance stands for diameters."""
     _, notes = crosses.of_one(table(tmp_path, CROSS), CARDAN, {})
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
-    errors, notes = crosses.of_one(table(tmp_path, "part,pin1.clearance [um]\nA7,5\n"), CARDAN, {})
+    errors, notes = crosses.of_one(table(tmp_path, "pin1.clearance [um],grade\n5,2\n"), CARDAN, {})
     assert errors == {"pin1.clearance": pytest.approx(5e-6)}
-    assert notes[0].endswith("columns left out: part")
+    assert notes[0].endswith("columns left out: grade")
     assert notes[-1].endswith("46 errors not measured: taken as nominal")
 
 
@@ -63,7 +80,22 @@ REFUSED = {
     "names that are no errors": (
         "pin1.tilt_x,pin1.position,hole9.tilt_t,PIN2.tilt_t,pin1.tilt_z [deg],p.no\n1,2,3,4,5,6\n",
         r"cross.csv:1: has columns that are no errors: 'pin1.tilt_x', 'pin1.position', 'hole9.tilt_t', 'PIN2.tilt_t'\n"
-        r".*remove or rename them: did you mean 'tilt_z'\?",
+        r".*remove or rename them: did you mean 'pin1.tilt_z'\?; give pin1.offset_t, .*; write 'pin2.tilt_t' for 'PIN2",
+    ),
+    "a pattern": (
+        "hole*.tilt_z,pin1.tilt_z [deg]\n1,2\n",
+        r"no errors: 'hole\*.tilt_z'\n.*give a column for each of hole1.tilt_z, .*, hole4.tilt_z$",
+    ),
+    "another separator": ("pin1-tilt_z,pin1.tilt_t [deg]\n1,2\n", r"write 'pin1.tilt_z' for 'pin1-tilt_z'"),
+    "other places of the words": ("tilt z Pin 1,pin1.tilt_t [deg]\n1,2\n", r"write 'pin1.tilt_z' for 'tilt z Pin 1'"),
+    "a unit without brackets": (
+        "pin1.tilt_z / deg,pin1.tilt_t [deg]\n1,2\n",
+        r"write 'pin1.tilt_z' for 'pin1.tilt_z / deg', and a unit in brackets",
+    ),
+    "a typing error": ("pin1tlt_z,pin1.tilt_t [deg]\n1,2\n", r"no errors: 'pin1tlt_z'\n.*did you mean 'pin1.tilt_z'\?"),
+    "an empty cell": (
+        "pin1.tilt_z [deg],pin1.tilt_t (deg)\n,−0.1\n",
+        r"cross.csv:2: pin1.tilt_z: has no number: the cell is empty",
     ),
     "a zone": (
         "pin1.position,pin1.tilt_z [deg]\n1,2\n",

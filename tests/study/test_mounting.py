@@ -257,6 +257,26 @@ def test_a_spline_is_refused_where_it_means_nothing(tmp_path: Path) -> None:
     assert "only joints with joint.shaft.spline have it" in faults(tmp_path, ("[tolerances]\n", without))
 
 
+@pytest.mark.parametrize(
+    ("diameter", "entry", "words"),
+    [
+        ("40 mm", '[tolerances]\nshaft.spline = { plus_minus = 2, distribution = "uniform" }\n', "reaches"),
+        ("40 mm", "[errors]\nshaft.spline = -1.5\n[tolerances]\n", "errors.shaft.spline: reaches -1.5"),
+        ("0.4 mm", "[tolerances]\n", "0.4 mm is no pitch diameter of a spline"),
+        ("40 m", "[tolerances]\n", "40 m is no pitch diameter of a spline"),
+    ],
+)
+def test_a_spline_that_no_shaft_has_is_refused(tmp_path: Path, diameter: str, entry: str, words: str) -> None:
+    spline = SPLINE[0], SPLINE[1].replace("40 mm", diameter)
+    assert words in faults(tmp_path, spline, ("[tolerances]\n", entry))
+
+
+def test_a_spline_may_hold_all_of_its_force(tmp_path: Path) -> None:
+    for law in ("uniform", "normal"):
+        entry = f'[tolerances]\nshaft.spline = {{ plus_minus = 1, distribution = "{law}" }}\n'
+        assert "shaft.spline" in load(tmp_path, SPLINE, ("[tolerances]\n", entry)).tolerances
+
+
 def test_a_case_says_which_force_is_stuck(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(HEAD.replace(*SPLINE) + '[errors]\nshaft.spline = "-1"\n', encoding="utf-8")

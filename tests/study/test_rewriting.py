@@ -111,6 +111,7 @@ alpha = "15 deg"
     [
         ("joint.shaft.axial=free", '{ mass = "3 kg" }', '{ mass = "3 kg", axial = "free" }'),
         ('joint.shaft.mass="4 kg"', "3 kg", "4 kg"),
+        ('"joint".\'shaft.mass\'="4 kg"', "3 kg", "4 kg"),
         ("joint.contact.clearance = 0.2 mm", '"0.1 mm"  # why', '"0.2 mm"  # why'),
         (
             "joint.bushing.cross.k_x=2e9 N/m",

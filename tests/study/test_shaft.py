@@ -109,6 +109,11 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
              "shaft.alhpa: unknown key | did you mean 'alpha'?"],
         ),
         (
+            HEAD + SPLINE.replace("40 mm", "80 mm") + SCATTER + RANDOM,
+            ["shaft: spline.diameter = 80 mm is larger than tube.diameter = 76 mm | "
+             "give the pitch diameter of the spline"],
+        ),
+        (
             HEAD.replace('"6 deg"', '"90 deg"') + SCATTER + RANDOM,
             ["shaft.alpha: a Cardan joint cannot turn at 90 deg | give less than 90 deg"],
         ),
@@ -153,7 +158,7 @@ def test_errors_of_each_joint_are_selected(entries: str, scattering: list[str]) 
         (
             WHOLE + '[limits]\n"*.F" = "900 N"\n"joint3.cross1.F" = "900 N"\njoint1.psi = 1e-3\n',
             ["limits.*.F: selects nothing | write the joint before it: joint1.*.F, or joint*.*.F for all joints",
-             "limits.joint3.cross1.F: selects nothing | did you mean 'joint2.cross1'?",
+             "limits.joint3.cross1.F: selects nothing | did you mean 'joint2.cross1.F'?",
              "limits.joint1.psi: selects nothing | did you mean 'psi'?"],
         ),
         (

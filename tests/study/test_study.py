@@ -308,8 +308,8 @@ def test_remedies_name_the_right_word(tmp_path: Path) -> None:
     for change, remedy in [
         (("steps_per_rev", "steps_per_rve"), "did you mean 'steps_per_rev'?"),
         (("[output]", "[ouput]"), "did you mean 'output'?"),
-        (('"hole*.tilt_z"', '"hloe2.tilt_z"'), "did you mean 'hole2'?"),
-        (('"hole*.tilt_z"', '"hole*.tilt_y"'), "did you mean 'tilt_"),
+        (('"hole*.tilt_z"', '"hloe2.tilt_z"'), "did you mean 'hole2.tilt_z'?"),
+        (('"hole*.tilt_z"', '"hole*.tilt_y"'), "did you mean 'hole*.tilt_"),
         (("rho = 0.6", "roh = 0.6"), "did you mean 'rho'?"),
         (("seed = 7", "Seed = 7"), "did you mean 'seed'?"),
         (('speed = "500 rpm"', "speed = 1200"), 'write "1200 rpm" or "1200 rad/s"'),

@@ -40,12 +40,15 @@ class FirstOrder(NamedTuple):
         is NaN for dependent samples, an index is NaN where error or load does not scatter.
     variance : float
         Variance of the load, in its unit squared; an index times the variance is the error's contribution.
+    additive : tuple of float
+        Sum of the indices, and the ends of its interval.
     """
 
     estimate: FloatArray
     lower: FloatArray
     upper: FloatArray
     variance: float
+    additive: tuple[float, float, float]
 
 
 class Total(NamedTuple):
@@ -92,8 +95,10 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
 
     The conditional mean of the load given one error is fitted by a continuous piecewise linear function with cbrt(n)
     pieces (8 to 32) of equally many joints (Plischke, Borgonovo and Smith 2013 use a step function; linear pieces are
-    exact for a load that is linear in the error). Its share of the variance is corrected for the degrees of freedom.
-    The interval is from the index's influence function, with a standard error taken `WIDER` times as large.
+    exact for a load that is linear in the error). What chance adds to its share of the variance is estimated by leaving
+    out one joint at a time and subtracted (Kline, Saggio and Sølvsten 2020): joints with large errors often scatter
+    more than others, and a correction for the degrees of freedom alone leaves a bias. The interval is from the index's
+    influence function, with a standard error taken `WIDER` times as large.
 
     Parameters
     ----------
@@ -125,12 +130,13 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     """
     errors, loads = _checked(x, y)
     e = loads - loads.mean()
-    share, error = np.full((2, errors.shape[1]), np.nan)
+    share, chance = np.full((2, errors.shape[1]), np.nan)
+    influence = np.full(errors.shape, np.nan)
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0 and e.var() > 0:
             fit = _fit(column, e)
-            share[i], error[i] = fit.share, _error(fit.influence, fit.chance)
-    return _with_ends(share, error * _wider(e**2), float(e.var()), confidence, iid)
+            share[i], influence[:, i], chance[i] = fit.share, fit.influence, fit.chance
+    return _with_ends(share, influence, chance, e, confidence, iid)
 
 
 def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:
@@ -172,7 +178,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     influence = np.column_stack([fit.influence for fit in fits])
     chance = np.array([fit.chance for fit in fits])
     wider = _wider(e**2)
-    alone = _with_ends(first, _error(influence, chance) * wider, float(e.var()), confidence, iid)
+    alone = _with_ends(first, influence, chance, e, confidence, iid)
     # subtract significant effects of single errors, which would be noise in the estimates of pairs
     main = sum((fit.mean for fit, s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
@@ -191,9 +197,17 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     return alone, Total(estimate, lower, upper, pairs, float(rest))
 
 
-def _with_ends(estimate: FloatArray, error: FloatArray, variance: float, confidence: float, iid: bool) -> FirstOrder:
-    half = WIDER * half_width(confidence) * error if iid else np.full(estimate.shape, np.nan)
-    return FirstOrder(estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance)
+def _with_ends(
+    estimate: FloatArray, influence: FloatArray, chance: FloatArray, e: FloatArray, confidence: float, iid: bool
+) -> FirstOrder:
+    """First-order indices and their sum with intervals, from influence functions, (n, d), and deviations, (n,)."""
+    z = WIDER * half_width(confidence) * _wider(e**2) if iid else np.nan
+    half, known = z * _error(influence, chance), np.isfinite(estimate)
+    of_sum = z * float(_error(influence[:, known].sum(axis=1), float(chance[known].sum())))
+    additive = float(estimate[known].sum())
+    low, high = (float(np.clip(additive + sign * of_sum, 0, 1)) for sign in (-1.0, 1.0))
+    lower, upper = (np.clip(estimate + sign * half, 0, 1) for sign in (-1.0, 1.0))
+    return FirstOrder(estimate, lower, upper, float(e.var()), (additive, low, high))
 
 
 def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -219,10 +233,11 @@ def _fit(column: FloatArray, centred: FloatArray) -> Fit:
     size, axes = np.linalg.eigh(hats.T @ hats)  # well conditioned: hats overlap with neighbours only
     scatters = size > 1e-12 * n
     basis, degrees = axes[:, scatters] / np.sqrt(size[scatters]), int(scatters.sum())
-    mean = hats @ (basis @ (basis.T @ (hats.T @ centred)))
+    directions = hats @ basis
+    mean, leverage = directions @ (directions.T @ centred), (directions**2).sum(axis=1)
     variance = (centred**2).mean()
-    inside = ((centred - mean) ** 2).sum() / (n - 1 - degrees)
-    share = float(1.0 - inside / (variance * n / (n - 1)))
+    scatter = centred * (centred - mean) / (1.0 - np.minimum(leverage + 1.0 / n, 1.0 - 1e-9))  # of each joint, squared
+    share = float((mean @ mean - leverage @ scatter) / (n * variance))
     influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
     return Fit(mean, influence, share, 2.0 * degrees * ((1.0 - share) / n) ** 2)
 

@@ -18,8 +18,8 @@ from tolstat.campaign.block import Block, Timed, loads_of, results_of, simulate_
 from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
 from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
-from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, InputError, input_error, raise_all
+from tolstat.common.cores import number_of_workers
+from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.loads import shown_loads, units_of_loads
 from tolstat.common.tables import Options, tables
 from tolstat.joint import nominal_errors
@@ -79,7 +79,7 @@ class Function:
 
     def __init__(self, study: Study, loads: Sequence[str], point: str, workers: int | None) -> None:
         self._whole, self.study = study, study.at(point)
-        self.loads, self.workers = list(loads), workers
+        self.loads, self.workers = list(loads), number_of_workers(workers)
         self.names, self.cube_names = _names(study), sampling.streams(study)
         self.units = error_units(study.mechanism) | ({VARIANT: "1"} if VARIANT in self.names else {})
         self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
@@ -253,7 +253,7 @@ class Function:
             raise InputError([self.study.fault(key, found, remedy)])
 
     def _simulate(self, errors: NDArray[np.void], variant: NDArray[np.intp]) -> Array:
-        n, workers = len(errors), self.workers or available_cores()
+        n, workers = len(errors), self.workers
         self.simulated += n
         study, distinct = self.study, list(dict.fromkeys(self.options))
         option = np.array([distinct.index(own) for own in self.options])[variant]
@@ -313,10 +313,19 @@ def function(
     Raises
     ------
     InputError
-        When a load or the point is unknown, or with the faults of the file.
+        When a load or the point is unknown, there are no loads or workers, or with the faults of the file.
     """
-    study = study if isinstance(study, Study) else load(study)
-    faults = []
+    faults: list[Fault] = []
+    with gather(faults):
+        number_of_workers(workers)
+    if not isinstance(study, Study | str | Path):
+        found = f"{type(study).__name__} is no study"
+        faults.append(Fault("study", found, "give what tolstat.load makes, or the path of the TOML file"))
+    else:
+        with gather(faults):
+            study = study if isinstance(study, Study) else load(study)
+    if not isinstance(study, Study):
+        raise InputError(faults)
     loads = [loads] if isinstance(loads, str) else loads
     chosen: dict[str, None] = {}
     every = list(units_of_loads(study.mechanism))
@@ -325,6 +334,10 @@ def function(
         chosen.update(dict.fromkeys(names))
         if not names:
             faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, every)))
+    if not chosen and not faults:
+        faults.append(
+            Fault("loads", "is empty", 'give names or patterns, such as ["cross*.F"]; None: those with limits')
+        )
     raise_all(faults)
     return Function(study, list(chosen), point, workers)
 

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, raise_all
+from tolstat.common.errors import Fault, input_error, raise_all
 from tolstat.common.strict import did_you_mean
 
 Array = NDArray[np.float64]
 
+NO_NUMBERS = "has values that are no real numbers", "give a number for each joint and error, in SI units"
 MAX_NAMED = 5
 """Most columns of one kind that a message names."""
 
@@ -51,9 +52,9 @@ def columns_of(values: Any, needed: Sequence[str], others: Collection[str], attr
     columns: dict[str, Array] = {}
     for name in (name for name in known if names.count(name) == 1):
         try:
-            columns[name] = np.ascontiguousarray(values[name], float)
+            columns[name] = np.ascontiguousarray(_floats(values[name]))
         except (TypeError, ValueError):
-            faults.append(Fault(f"{place}: {name}", "has no numbers", "give a number for each joint, in SI units"))
+            faults.append(Fault(f"{place}: {name}", *NO_NUMBERS))
     shapes = {name: column.shape for name, column in columns.items()}
     first = next(iter(shapes.values()), (0,))
     for name, shape in shapes.items():
@@ -94,6 +95,20 @@ def _faults_of_names(
     return faults
 
 
+def _floats(values: Any) -> Array:
+    """Values as floats.
+
+    Raises
+    ------
+    TypeError, ValueError
+        When some are no real numbers.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind == "c":  # of which numpy would take the real part
+        raise TypeError
+    return array.astype(float)
+
+
 def _listed(names: Sequence[Hashable]) -> str:
     """The first names of a list, and the number of the others."""
     more = len(names) - MAX_NAMED
@@ -101,7 +116,10 @@ def _listed(names: Sequence[Hashable]) -> str:
 
 
 def _by_position(values: Any, needed: Sequence[str], attribute: str) -> list[Array]:
-    table = np.asarray(values, float)
+    try:
+        table = _floats(values)
+    except (TypeError, ValueError) as error:
+        raise input_error("array of the joints", *NO_NUMBERS) from error
     if table.ndim != 2 or table.shape[1] != len(needed):
         wanted = f"(n, {len(needed)}), a row for each joint and a column for each of f.{attribute}"
         remedy = "; give [x] for one joint" if table.shape == (len(needed),) else ""

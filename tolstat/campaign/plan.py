@@ -19,7 +19,7 @@ from tolstat.campaign import verify
 from tolstat.campaign.block import spread
 from tolstat.campaign.chosen import few
 from tolstat.campaign.run import choose_fidelity
-from tolstat.common.cores import available_cores
+from tolstat.common.cores import number_of_workers
 from tolstat.common.loads import load_of, split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
@@ -220,7 +220,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     -------
     Plan
     """
-    workers = workers or available_cores()
+    workers = number_of_workers(workers)
     stage(stage_name(study.mechanism))
     warm_up(mechanism=study.mechanism)
     stage("pilot")

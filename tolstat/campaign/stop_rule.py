@@ -9,21 +9,24 @@ campaign that is extended afterwards stay looks.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic_core import PydanticCustomError
 
 from tolstat.analysis import binomial
 from tolstat.campaign.pool import kept_workers
-from tolstat.common import text_table
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.loads import ANY_LIMIT, AT, Limit, load_of, units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
+from tolstat.common.units import to_si
 from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
 from tolstat.study.selection import Entry, quantity, resolve
@@ -32,7 +35,7 @@ CONFIDENCE = 0.95
 BIASED = f"biased high if few joints are above ({100 * binomial.BIAS:.0f} % of itself with {binomial.LEAST_BESIDE})"
 """Sentence on the share at a stop."""
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
-_STATEMENT = re.compile(r"\s*P\s*\((?P<limit>[^)]*)\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*")
+_STATEMENT = re.compile(r"\s*P\s*\((?P<limit>[^)]*)\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S.*?)\s*")
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
@@ -161,7 +164,7 @@ def parse(
     Parameters
     ----------
     text : str
-        ``"P(LIMIT) width < 0.002"``, with a LIMIT as in `limit_of`.
+        ``"P(LIMIT) width < 0.002"``, or ``< 0.2 %``, with a LIMIT as in `limit_of`.
     limits : mapping
         Limits of the study, SI.
     mechanism : Mechanism
@@ -181,10 +184,13 @@ def parse(
     InputError
         With every fault of the statement.
     """
-    match = _STATEMENT.fullmatch(text)
+    match, bound = _STATEMENT.fullmatch(text), math.nan
     if match is None or match["what"] != what:
-        raise input_error(option, f"{text!r} is not a rule", example)
-    bound = text_table.number(match["bound"])
+        alone = re.fullmatch(r"\s*(?:<|<=|≤)?\s*([\d.]+\s*%?)\s*", text)
+        whole = f'write {option} "{" ".join(filter(None, (f"P({ANY_LIMIT})", what, "<")))} {alone[1]}"' if alone else ""
+        raise input_error(option, f"{text!r} is not a rule" + ": it says no limit" * bool(alone), whole or example)
+    with suppress(PydanticCustomError):
+        bound = to_si(match["bound"], "1")
     with collected() as faults:
         with gather(faults):
             limit = limit_of(match["limit"], limits, mechanism, option, example)

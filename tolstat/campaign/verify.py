@@ -173,11 +173,11 @@ Make = Callable[[NDArray[np.void], Sequence[Options], Mechanism], dict[str, Chec
 
 
 def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> Verification | None:
-    """Check so many settled joints, all with None, the nominal one included; None if no joint is settled.
+    """Check so many settled joints, all with None; the nominal one only where no other is settled. None without any.
 
     `make` makes the checks from parameters and solver options of joints; `seed` is that of the random choice.
     """
-    slots = np.flatnonzero(store.status() == Status.OK) if joints is None else choose(settled(store), joints, seed)
+    slots = choose(settled(store), joints, seed)
     return check_slots(store, slots, seed, make) if slots.size else None
 
 
@@ -221,7 +221,7 @@ def check(
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
-    `joints` is a number, or ``"all"`` for all settled joints, the nominal one included.
+    `joints` is a number, or ``"all"`` for all settled joints.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def check_file(path: Path, joints: int | None, seed: int | None = None, make: Ma
     path : Path
         The file; its campaign may be unfinished.
     joints : int or None
-        Number of joints; None for all settled joints, including the nominal joint.
+        Number of joints; None for all settled joints.
     seed : int, optional
         Seed of the random choice; the campaign's own seed without it.
     make : callable
@@ -351,7 +351,7 @@ def check_study(
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
         raise InputError([study.fault("solver.fidelity", found, remedy)])
     seed = study.sampling.seed if seed is None else seed
-    rows = choose(np.arange(0 if joints is None else study.first_sample, study.rows), joints, seed)
+    rows = choose(np.arange(study.first_sample, study.rows), joints, seed)
     errors = draw(study)[rows]
     options = [study.solvers[number].options() for number in variants(study, rows).tolist()]
     each = []

@@ -38,8 +38,8 @@ from tolstat.questions import Question
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
 """What a value with a unit is, by its unit."""
-SHARES = '"0.1 %", "1000 ppm" or 0.001'
-"""How a share is written."""
+WRITTEN = {"1": '"0.1 %", "1000 ppm" or 0.001', "s": '"5 min", "90 s" or "2 h"'}
+"""How such a value is written, by its unit."""
 
 
 @contextmanager
@@ -113,14 +113,14 @@ def quantity(text: str, opt: options.Opt, flag: str) -> float:
         When the text is no such value, or not between the limits of the option.
     """
     unit = opt.unit or "1"
-    try:
-        value = units.to_si(text, unit)
-    except ValueError:
-        value = float("nan")
     low, high = 0.0 if opt.least is None else opt.least, float("inf") if opt.most is None else opt.most
+    try:
+        value, found = units.to_si(text, unit), ""
+    except ValueError as error:
+        value, found = float("nan"), str(error) if unit != "1" else ""
     if not low < value < high:
-        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{units.EXAMPLES[unit]}"')
-        raise InputError([Fault(flag, f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
+        remedy = f"write {flag} " + WRITTEN.get(unit, f'"{units.EXAMPLES[unit]}"')
+        raise InputError([Fault(flag, found or f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
     return value
 
 

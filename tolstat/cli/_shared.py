@@ -168,14 +168,14 @@ def _print_parts(answer: answers.Answer, wide: bool) -> None:
     for part in answer.parts:
         if isinstance(part, answers.Table) and part.columns:
             if not first:
-                typer.echo(f"\n{part.title}")
+                echo(f"\n{part.title}")
             print_table(part.columns, part.for_people, wide)
             first = False
         elif isinstance(part, answers.Listing):
-            typer.echo(f"\n{part.title}\n{part.text}")
+            echo(f"\n{part.title}\n{part.text}")
         elif isinstance(part, answers.Sentence):
             if part.place == "lead":
-                typer.echo(part.text if wide else textwrap.fill(part.text, WIDTH))
+                echo(part.text if wide else textwrap.fill(part.text, WIDTH))
                 first = False
             else:
                 say(part.text)
@@ -184,9 +184,14 @@ def _print_parts(answer: answers.Answer, wide: bool) -> None:
 def print_table(columns: Sequence[table.Column], rows: table.Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     text, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
-    typer.echo(text)
+    echo(text)
     if missing:
         say(missing)
+
+
+def echo(text: str = "") -> None:
+    """Print on standard output, in its encoding: typer would write UTF-8 where that is ASCII."""
+    print(text, flush=True)
 
 
 def json_of(values: Any) -> str:
@@ -196,7 +201,7 @@ def json_of(values: Any) -> str:
 
 def print_json(values: Any) -> None:
     """Print plain values as JSON on standard output."""
-    typer.echo(json_of(values))
+    echo(json_of(values))
 
 
 def write(target: str | Path, content: Callable[[TextIO], object], what: str | None = None) -> None:

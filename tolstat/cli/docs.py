@@ -8,10 +8,8 @@ import textwrap
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from tolstat.cli._library import schemas
-from tolstat.cli._shared import WIDTH, print_json, say
+from tolstat.cli._shared import WIDTH, echo, print_json, say
 from tolstat.common.errors import input_error
 from tolstat.common.files import docs_dir
 from tolstat.common.strict import did_you_mean
@@ -53,7 +51,7 @@ def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
         width = max(map(len, titles))
         for name, title in titles.items():
             indent = " " * (width + 2)
-            typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
+            echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
         say("next: tolstat docs study")
 
 
@@ -71,7 +69,7 @@ def page_name(file: str) -> str:
 
 def _print_page(text: str) -> None:
     if not sys.stdout.isatty():
-        typer.echo(text)
+        echo(text)
         return
     from rich.console import Console
     from rich.markdown import Markdown
@@ -109,5 +107,5 @@ def cache(*, clear: bool = False) -> None:
         return
     for folder in cache_folder.folders():
         files, size = cache_folder.size(folder)
-        typer.echo(f"{folder}: {files} kernels, {size / 1e6:.1f} MB")
+        echo(f"{folder}: {files} kernels, {size / 1e6:.1f} MB")
     say(f"in use: {cache_folder.CACHE_DIRECTORY}")

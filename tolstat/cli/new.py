@@ -8,10 +8,8 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
-import typer
-
 from tolstat.cli._library import np, spectra, starter, studies, text
-from tolstat.cli._shared import say
+from tolstat.cli._shared import echo, say
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import Opt
@@ -108,7 +106,7 @@ def _write_cycle(path: Path, signal: Path, alpha: float | None, exponent: float,
     for name, alpha, speed, torque, time, damage in zip(spectra.names(cycle), *values, strict=True):
         operation = f"{np.degrees(alpha):.4g} deg", f"{speed * 30 / np.pi:.4g} rpm", f"{torque:.4g} N m"
         rows.append((name, *operation, text.percent(time), text.percent(damage)))
-    typer.echo(text.align(rows))
+    echo(text.align(rows))
     for gap in cycle.gaps:
         say(f"{gap}, which is not counted")
     share, rest = text.percent(1.0 - cycle.time.sum()), text.percent(max(0.0, 1.0 - cycle.damage.sum()))

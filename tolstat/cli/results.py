@@ -14,7 +14,18 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import deliver, json_of, print_json, print_table, progress, say, wrapped, write, write_frame
+from tolstat.cli._shared import (
+    deliver,
+    echo,
+    json_of,
+    print_json,
+    print_table,
+    progress,
+    say,
+    wrapped,
+    write,
+    write_frame,
+)
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import check_target
@@ -61,9 +72,9 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         shares = [row for table in tables[:1] for row in table.rows]
         print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
-    typer.echo("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))]))
+    echo("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))]))
     for table in tables[:1]:
-        typer.echo()
+        echo()
         print_table(table.columns, table.for_people, wide)
 
 

@@ -9,10 +9,8 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any, Literal
 
-import typer
-
 from tolstat.cli import _library as library
-from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped
+from tolstat.cli._shared import deliver, echo, print_json, print_study_notes, progress, say, work, wrapped
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
@@ -49,11 +47,11 @@ def plan(
     if as_json:
         print_json(asdict(prediction) | {"seconds": prediction.seconds})
     else:
-        typer.echo(wrapped("\n".join(_lines(prediction))))
+        echo(wrapped("\n".join(_lines(prediction))))
         meanings = {library.joints.ENTRIES: prediction.tolerances, library.joints.CORRELATED: prediction.correlations}
         for columns, rows in meanings.items():
             if rows:
-                typer.echo(f"\n{library.table.fitted(columns, rows)[0]}")
+                echo(f"\n{library.table.fitted(columns, rows)[0]}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 

@@ -11,7 +11,7 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import deliver, print_json, print_warnings, progress, say, warn, work, write, write_frame
+from tolstat.cli._shared import deliver, echo, print_json, print_warnings, progress, say, warn, work, write, write_frame
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
@@ -57,7 +57,7 @@ def simulate(
     joints = library.parts.of_case(loaded, result)
     _deliver(result, joints.values() if as_json and joints.parts else {}, out, as_json)
     if joints.parts and not as_json:
-        typer.echo()
+        echo()
         deliver(joints, wide=False)
 
 
@@ -100,7 +100,7 @@ def _deliver(result: library.replays.CaseResult, facts: dict[str, Any], out: Pat
         print_json(summary)
     else:
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        typer.echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
+        echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
     state = library.tables.Status[str(summary["status"]).upper()]
     if state != library.tables.Status.OK:
         warn(f"warning: {state.label}: {library.tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
@@ -150,9 +150,11 @@ def evaluate(
     Errors are deviations, those of operation.* from the operating point, as tolstat export writes them. Errors
     without a column are those of [errors] of STUDY, or nominal, as is said. Zones of STUDY do not matter: joints have
     offsets and tilts. If STUDY has several joints, a column variant says which. Other columns are left out and named.
-    The output has a row for each joint in the same order: its status, then its loads, with the names in the first line
-    and the units in the second. A load is empty where a joint has none. If STUDY has limits, or the joint what rating
-    lives need, prints which joints are beyond a limit, loads with limits, those of the shafts, and lives.
+    A column such as name or part, or the first one if it is no error, names the joints. The output has a row for each
+    joint in the same order: its name, if the joints have any, its status, its loads, and if the joint has what they
+    need the rating lives of its bearings, with the names in the first line and the units in the second. A load is empty
+    where a joint has none. If STUDY has limits, or lives, prints which joints are beyond a limit, and of up to three
+    joints loads with limits, those of the shafts, and lives.
 
     Example: tolstat evaluate studies/iso2768_f.toml --in joints.csv --out y.csv
 
@@ -182,14 +184,21 @@ def evaluate(
     for note in joints.notes:
         say(note)
     own = dict.fromkeys(library.tables.FACTORS, 1.0) | whole.errors
-    nominal = {name: np.full(len(joints.lines), own.get(name, 0.0)) for name in varied}
+    nominal = {name: np.full(len(joints.labels), own.get(name, 0.0)) for name in varied}
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(joints.columns) if uniform else nominal | joints.columns)
     unit_of = library.load_units.units_of_loads(f.study.mechanism)
-    head = [["status", *chosen.loads], ["", *(unit_of[name] for name in chosen.loads)]]
-    columns = y[:, : len(chosen.loads)].T.tolist()
-    rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *columns])
+    has_life = np.isin(f.status, library.tables.VALID)
+    lives = {
+        name: np.where(has_life, h, np.nan).tolist() for name, h in library.parts.lives(f.study, f.turning).items()
+    }
+    head = [["status", *chosen.loads, *lives], ["", *(unit_of[name] for name in chosen.loads), *("h" for _ in lives)]]
+    columns = [[library.tables.Status(number).label for number in f.status], *y[:, : len(chosen.loads)].T.tolist()]
+    columns += lives.values()
+    if joints.named:
+        head, columns = [["joint", *head[0]], ["", *head[1]]], [joints.labels, *columns]
+    rows = library.text.csv_rows(columns)
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
     invalid = f.status[~np.isin(f.status, library.tables.VALID)]
     say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {invalid.size} of them without a valid load")
@@ -199,8 +208,8 @@ def evaluate(
         if hint:
             say(f"  hint: {hint}")
     if out != "-":
-        values, labels = dict(zip(f.loads, y.T, strict=True)), [f"line {line}" for line in joints.lines]
-        found = library.parts.parts(f.study, values, f.turning, labels, f.status)
+        values = dict(zip(f.loads, y.T, strict=True))
+        found = library.parts.parts(f.study, values, f.turning, joints.labels, f.status)
         deliver(library.answers.Answer("evaluate", "Joints", found), wide=False)
 
 
@@ -255,5 +264,5 @@ def show(
             library.drawings.lengths(joint, alphas),
         )
     (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix,))
-    typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])
+    echo(library.table.fitted(library.table.plain(rows), rows)[0])
     say(f"wrote {path}")

@@ -16,6 +16,8 @@ from functools import partial
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
+from tolstat.common.errors import input_error
+
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -56,6 +58,21 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def number_of_workers(workers: int | None) -> int:
+    """Return the number of worker processes that was asked for: one per core with None.
+
+    Raises
+    ------
+    InputError
+        When it is no whole number of at least one.
+    """
+    if workers is None:
+        return available_cores()
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise input_error("workers", f"{workers!r} is no number of processes", "give a whole number of at least 1")
+    return workers
 
 
 T = TypeVar("T")

@@ -18,6 +18,8 @@ MAX_INPUT_BYTES = 64_000_000
 """Largest size of a text file that is read, bytes."""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 """Marks before text in UTF-16."""
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of a result file."""
 WIDE = 64
 """First bytes of a file, of which every second one is zero in UTF-16."""
 
@@ -73,6 +75,8 @@ def read_input(path: Path, utf_16: bool = False) -> str:
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "is a pipe or a device, not a file", str(path))
         content = file.read(MAX_INPUT_BYTES + 1)
+    if content.startswith(HDF5):
+        raise UnicodeDecodeError("utf-8", HDF5, 0, 1, "HDF5")
     if len(content) > MAX_INPUT_BYTES:
         raise OSError(errno.EFBIG, f"is larger than {MAX_INPUT_BYTES / 1e6:g} MB", str(path))
     if utf_16 and content.startswith(UTF_16):
@@ -87,6 +91,8 @@ def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:
     """Say what a file is that is not UTF-8 text, and the remedy."""
     content, remedy = error.object, "save it as UTF-8"
     head = content[:WIDE]
+    if content == HDF5:
+        return "is a result file (HDF5), and text is needed", "give the study (TOML), or whichever text is meant"
     if content.startswith(UTF_16) or abs(2 * head.count(0) - len(head)) < 2:
         return "is UTF-16 text, not UTF-8", remedy
     if b"\0" in content:

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 DIAMETER = "⌀"
 PLUS_MINUS = "±"
+MINUS = str.maketrans("−–", "--")
+"""Signs that spreadsheets and text processors write for a minus."""
 NAMES = {DIAMETER: "a diameter", PLUS_MINUS: "a band"}
 """What a value with each sign is."""
 

@@ -271,13 +271,20 @@ def _written(data: object, location: Sequence[int | str], key: Sequence[str]) ->
     return ".".join(key)
 
 
-def did_you_mean(word: str, allowed: Sequence[str]) -> str:
-    """Remedy for an unknown word: what a word of the trade means, else the closest of the allowed ones, else all."""
+def did_you_mean(word: str, allowed: Sequence[str], before: str = "", behind: str = "") -> str:
+    """Remedy for an unknown word: what a word of the trade means, else the closest of the allowed ones, else all.
+
+    Of a part of a name, `before` and `behind` are what else the name has.
+    """
     if remedy := words.remedy(word):
         return remedy
     spelt = {name.lower(): name for name in allowed}
     close = difflib.get_close_matches(word.lower(), spelt, n=1)
-    return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    return (
+        f"did you mean {before + spelt[close[0]] + behind!r}?"
+        if close
+        else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    )
 
 
 def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, FieldInfo]:

@@ -20,11 +20,12 @@ from pydantic_core import PydanticCustomError
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, raise_all
 from tolstat.common.loads import FloatArray
+from tolstat.common.notation import MINUS
 
 SHOWN = 20
 """Maximum number of faults of a file that a message lists."""
-_HEAD = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
-"""Name and unit in a cell of the header."""
+_HEAD = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))?", re.DOTALL)
+"""Name and unit in a cell of the header; in parentheses a usual unit only."""
 _UNIT = re.compile(r"(?!(?:nan|inf|infinity)$)(?:1\s*/\s*)?[^\W\d_].*|[°%].*|[1-]|", re.IGNORECASE)
 """Unit in a cell below the header."""
 _PURE = {"", "1", "-"}
@@ -34,6 +35,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.ASCII | re.IG
 
 def number(text: str) -> float:
     """Finite number that a text is, with a decimal point; NaN if it is none."""
+    text = text.translate(MINUS)
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     return value if math.isfinite(value) else math.nan
 
@@ -80,7 +82,7 @@ class TextTable:
         self.columns: dict[str, int] = {}
         self.units: dict[str, str] = {}
         for index, cell in enumerate(header):
-            name, unit = _HEAD.fullmatch(cell).groups("")  # type: ignore[union-attr]  # it matches any text
+            name, unit = _name_and_unit(cell)
             if name in self.columns:
                 self.fault(self.head, name, "is there twice", "rename or remove one of the columns")
             if name:
@@ -188,7 +190,10 @@ class TextTable:
         for row, column in np.argwhere(np.isnan(values)):
             (line, cells), name = self.rows[row], list(columns)[column]
             remedy = "give a number, without unit and thousands separators"
-            self.fault(line, name, f"{cells[columns[name]]!r} is no finite number", remedy)
+            cell = cells[columns[name]]
+            self.fault(
+                line, name, f"{cell!r} is no finite number" if cell else "has no number: the cell is empty", remedy
+            )
         if (number := len(self.rows) + len(self._refused)) < least:
             self.fault(self.head, "", f"has {number} rows below it", f"give at least {least}")
         return {
@@ -201,7 +206,7 @@ class TextTable:
         if not self.rows or any(self.units[name] for name in columns):
             return self.head
         line, cells = self.rows[0]
-        units_of = {name: cells[column].strip("[] ") for name, column in columns.items()}
+        units_of = {name: _in_brackets(cells[column]) for name, column in columns.items()}
         if not all(map(_UNIT.fullmatch, units_of.values())) or set(units_of.values()) <= _PURE:
             return self.head
         self.units |= units_of
@@ -217,6 +222,19 @@ class TextTable:
             found = f"[{unit}] is no unit of it" if unit else "has no unit"
             self.fault(line, name, found, f"write its unit into the header: {name} [{_usual(si)}]")
             return math.nan
+
+
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """Name and unit in a cell of the header; the unit is empty where there is none."""
+    name, brackets, parentheses = _HEAD.fullmatch(cell).groups("")  # type: ignore[union-attr]  # it matches any text
+    if not parentheses or any(parentheses in usual for usual in units.FACTORS.values()):
+        return name, brackets or parentheses
+    return cell, ""
+
+
+def _in_brackets(cell: str) -> str:
+    """Text of a cell, of one in brackets or parentheses without these."""
+    return cell[1:-1].strip() if (cell[:1], cell[-1:]) in (("[", "]"), ("(", ")")) else cell
 
 
 def _usual(si: str) -> str:

@@ -125,8 +125,9 @@ def to_si(value: object, unit: str, mark: str = "") -> float:
     if len(value) > notation.MAX_LENGTH:
         raise _fault(f"{value[:30]!r}... has {len(value)} characters, which no number with a unit has", unit)
     if read is None:
-        point = value.replace(",", ".")
-        remedy = f'write a decimal point: "{point}"' if point != value and notation.read(point) else ""
+        point = value.replace(",", ".").translate(notation.MINUS)
+        sign = "decimal point" if "," in value else "hyphen for minus"
+        remedy = f'write a {sign}: "{point}"' if point != value and notation.read(point) else ""
         raise _fault(f"{value!r} is not a number with a unit", unit, remedy)
     if unit != "1" and not read.unit:
         raise _without_unit(value, unit)

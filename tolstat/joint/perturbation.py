@@ -23,8 +23,9 @@ from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Spline
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin
 from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
+from tolstat.joint.spline import Spline
 
 Table = NDArray[np.void]
 
@@ -90,7 +91,7 @@ class OperationOfShaft(Operation):
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
 SPLINE = "shaft.spline"
-"""Error of what has a `sections.Spline`: its axial force as a share of the largest one, from -1 to 1."""
+"""Error of what has a `spline.Spline`: its axial force as a share of the largest one, from -1 to 1."""
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:

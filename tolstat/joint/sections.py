@@ -15,7 +15,7 @@ from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
-from tolstat.joint.material import Array
+from tolstat.joint.spline import Coefficient, Spline
 
 Length = Annotated[units.Length, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -35,12 +35,6 @@ def _poisson(nu: float) -> float:
     if not 0.0 <= nu < 0.5:
         raise refuse(f"{nu:g} is not a Poisson's ratio of a metal", "give a number from 0 to below 0.5")
     return nu
-
-
-def _friction(mu: float) -> float:
-    if mu > 1.0:
-        raise refuse("{mu} is above 1", "give the coefficient of friction, such as 0.05", "mu")
-    return mu
 
 
 def _grade(grade: float) -> float:
@@ -194,10 +188,10 @@ class Thrust(Strict):
 class Friction(Strict):
     """Friction of the pins in their bearings."""
 
-    mu: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
+    mu: Coefficient | None = Field(default=None, examples=[0.05])
     """coefficient of friction around the pins, up to 1: rolling needles 0.002 to 0.005, plain bushes 0.05 to 0.15;
     when left out: no friction"""
-    mu_along: Annotated[Ratio, AfterValidator(_friction)] | None = Field(default=None, examples=[0.05])
+    mu_along: Coefficient | None = Field(default=None, examples=[0.05])
     """coefficient of friction along the pins, up to 1: needles roll around a pin and slide along it, 0.05 to 0.1; when
     left out: as around"""
     radius: Length | None = Field(default=None, examples=["12.5 mm"])
@@ -254,19 +248,6 @@ class Unbalance(Strict):
         if self.grade is None or self.mass is None or self.speed is None:
             return self.amount or 0.0
         return self.grade * self.mass / self.speed
-
-
-class Spline(Strict):
-    """Spline of the output shaft, which sticks with any axial force up to 2 mu T/d, T the torque of the joint."""
-
-    mu: Annotated[Ratio, AfterValidator(_friction)] = Field(examples=[0.1])
-    """coefficient of friction of its flanks"""
-    diameter: Length = Field(examples=["40 mm"])
-    """pitch diameter d"""
-
-    def largest_force(self, torque: Array) -> Array:
-        """Axial force (N) that its friction can hold at a torque (N m): 2 mu T/d."""
-        return abs(torque) * (2.0 * self.mu / self.diameter)
 
 
 class Shaft(Strict):

@@ -15,7 +15,8 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
-from tolstat.joint.sections import Length, Spline, Stiffness
+from tolstat.joint.sections import Length, Stiffness
+from tolstat.joint.spline import Spline
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
@@ -124,6 +125,11 @@ class DriveShaft(Strict):
             raise refuse("has tube2 without a spline", "remove tube2, or add [shaft.spline]")
         if self.spline is not None and self.spline.at >= self.length:
             raise refuse("spline.at = {spline.at} is not between the joints", "give less than length", "spline.at")
+        for key, tube in (("tube", self.tube), ("tube2", self.tube2)):
+            outer = math.inf if tube is None or tube.diameter is None else tube.diameter
+            if self.spline is not None and self.spline.diameter > outer:
+                found = f"spline.diameter = {{spline.diameter}} is larger than {key}.diameter = {{{key}.diameter}}"
+                raise refuse(found, "give the pitch diameter of the spline", "spline.diameter", f"{key}.diameter")
         return self
 
     @classmethod

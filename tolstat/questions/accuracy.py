@@ -121,8 +121,12 @@ def error_of_view(view: View, checks: Verification) -> str:
     """Sentence on the numerical error of a campaign from its `checks`, and on that near its limits."""
     words, near = error_note(checks, view.mechanism, view.limits, view.method in DRAWN), view.near
     known = _known(near, view.mechanism, view.limits) if near else {}
+    if near is None or not known:
+        return words
     largest = ", ".join(f"{kind} {row['worst']:.1e}" for kind, row in known.items())
-    return f"{words}; largest of the {len(near.rows)} joints nearest to limits: {largest}" if near and known else words
+    how = basis(near).partition(" ")[0]
+    how = "" if how in words else f" ({how})"
+    return f"{words}; largest of the {len(near.rows)} joints nearest to limits{how}: {largest}"
 
 
 def _known(verification: Verification, mechanism: Mechanism, limits: Iterable[str]) -> dict[str, Row]:
@@ -145,7 +149,7 @@ def error_note(
     if known and is_sample:
         points = np.unique(verification.rows, return_counts=True)[1].max()  # at each of them the same joints
         fewest = min(row["joints"] for row in known.values()) // points
-        words += [f"with 95 % confidence {bounded(fewest)} of all joints are below the largest"]
+        words += [f"at least {bounded(fewest)} of the production has smaller ones than the largest (confidence 95 %)"]
     noun = "error of numerics and fidelity" if comparison.FIDELITY in verification.checks else "numerical error"
     base = verification.base["status"] == Status.OK
     lost = {"": int((~base).sum())}  # joints that failed or did not settle, in the campaign and in each check

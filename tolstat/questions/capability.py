@@ -15,7 +15,7 @@ from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Asked, Column, Part, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Asked, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
 from tolstat.store import error_budget
@@ -23,6 +23,9 @@ from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
 """p-value of the test of normality below which the index of a normal load tells no share above the limit."""
+LEAST_INDEX = indices.FEWEST_MOMENTS
+"""Minimum number of valid joints for the estimate of an index: the 99.865 % quantile lies beyond fewer ones, and the
+index of mean and standard deviation has no interval."""
 ON_PAGE = (1e3, 1e4, 1e5)
 """Numbers of joints of which one exceeds the rare loads on the page."""
 FIGURES = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
@@ -39,7 +42,7 @@ LIMITS = (
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
     Column("above in delivery", text.delivery, rank=3),
     Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
-    Column("interval of Cpk", lambda row: text.ends(row["cpk_lower"], row["cpk_upper"], ".2f")),
+    Column("interval of Cpk", lambda row: _ends_of_cpk(row)),
     Column("Cpk by sigma", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
 )
 """Columns of the table ``limits``; the total interval is that of the yield."""
@@ -150,13 +153,15 @@ def limit_rows(view: View, delivery: int = DELIVERY) -> Rows:
         ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
         delivery. The last row, `ANY_LIMIT`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
         NaN where the load has a long tail (`analysis.capability.LONGEST_TAIL`), both indices where unresolved joints
-        matter (`analysis.binomial.unresolved_matter`).
+        matter (`analysis.binomial.unresolved_matter`), and their estimates for fewer than `LEAST_INDEX` valid joints.
     """
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
         row = dict(shares.good(view, load.name, delivery))
         index = indices.of_sample(load, row["limit"])
         both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
+        if load.valid.size < LEAST_INDEX:
+            both |= dict.fromkeys(("cpk", "cpk_normal"), np.nan)
         if shares.unresolved_matter(row):
             both = dict.fromkeys(both, np.nan)
         rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
@@ -235,6 +240,13 @@ def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
         yield Sentence(f'rarer ones: tolstat rare {study} --limit "{limit}"')
 
 
+def _ends_of_cpk(row: Row) -> str:
+    """Cell of the interval of Cpk; of too few joints its upper end."""
+    if math.isnan(row["cpk"]) and not math.isnan(row["cpk_upper"]):
+        return f"below {row['cpk_upper']:.2f}"
+    return text.ends(row["cpk_lower"], row["cpk_upper"], ".2f")
+
+
 def _notes(rows: Rows) -> Iterator[str]:
     """Definitions, unresolved joints, restrictions of the table of limits."""
     yield "limits are upper limits: Cpk is Cpu, of median and 99.865 % quantile (ISO 22514-2), and there is no Cp"
@@ -242,11 +254,11 @@ def _notes(rows: Rows) -> Iterator[str]:
     if unresolved := first["n_failed"] + first["n_unsettled"]:
         of = f"{unresolved} of {first['n']} joints without a valid load"
         yield f"{of}: in the intervals of yield and ppm both ways, in no Cpk"
-        if any(math.isnan(row["cpk"]) for row in rows):
+        if any(shares.unresolved_matter(row) for row in rows):
             yield "no Cpk where joints without a valid load make a share as uncertain as sampling does"
-    if any(math.isnan(row["cpk_lower"]) and not math.isnan(row["cpk"] + row["ppm_lower"]) for row in rows):
-        yield "no interval of Cpk where the intervals of median and 99.865 % quantile overlap: too few joints"
-    if any(row["cpk_lower"] == 0 for row in rows):
+    if first["n"] - unresolved < LEAST_INDEX:
+        yield f"Cpk needs {LEAST_INDEX} valid joints, its lower end {first['needed']}; fewer tell at most its upper end"
+    elif any(row["cpk_lower"] == 0 for row in rows):
         yield f"lower ends of Cpk need {first['needed']} valid joints"
     if any(row["normal_p"] < NOT_NORMAL for row in rows):
         yield f"'Cpk by sigma' tells no share above of a load that is not normal (p < {NOT_NORMAL:g})"

@@ -25,6 +25,7 @@ from tolstat.questions import shares
 from tolstat.store import Writer
 from tolstat.store.view import View
 from tolstat.study import changes
+from tolstat.study.rewriting import QUOTES
 
 TITLE = "A change on the same joints"
 FIRST, LEAST, MOST = 1024, 128, 16_384
@@ -147,7 +148,8 @@ class _Asked:
         shares.check_one_joint(view)
         self.text = changes.with_settings(view.study, settings)
         self.study = changes.read(view.study, self.text)
-        self.label = ", ".join("=".join(part.strip() for part in setting.split("=", 1)) for setting in settings)
+        plain = (setting.translate(QUOTES).split("=", 1) for setting in settings)
+        self.label = ", ".join("=".join(part.strip() for part in setting) for setting in plain)
         self.about = sets.with_study(view.study, self.study, self.label, range(0)).about
         if not self.about["differs"]:
             raise input_error(f"--set {self.label}", "changes nothing", "give a value that is not that of the study")
@@ -244,7 +246,7 @@ def simulate(
     Raises
     ------
     InputError
-        With every fault of the settings.
+        With every fault of the settings, or when the time is up before any joint is simulated.
     StoreError
         When the file cannot be used, or lacks joints and was made by other code.
     """
@@ -264,6 +266,9 @@ def simulate(
             if missing or n >= most or _is_settled(joints, joints.of(asked.about), accepted, confidence):
                 break
             n = min(2 * n, most)
+        if joints.of(asked.about) is None:
+            found = f"{budget:g} s were over before a joint with the change was simulated"
+            raise input_error("--budget", found, 'give more, such as --budget "5 min"; the same command goes on')
         if simulation.simulated:
             work.tell(f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s")
     return [path]

@@ -25,11 +25,14 @@ from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Ro
 from tolstat.display.options import Loads
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
+from tolstat.study.selection import select
 
 QUANTILES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
 LEVELS = 200
 """Approximate number of levels of a curve."""
+SIGNIFICANT = 0.05
+"""p-value below which a test shows a difference, beside intervals of 95 %."""
 MAX_LOADS = 4
 """Maximum number of loads with pictures."""
 SIZE = (drawing.WIDTH, 3.4)
@@ -90,7 +93,7 @@ SHARES = (
     Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
     Column("only A", word("only_a"), rank=1),
     Column("only B", word("only_b"), rank=1),
-    Column("p", lambda row: text.formed(row["p"], ".2g")),
+    Column("McNemar's p", lambda row: text.formed(row["p"], ".2g")),
 )
 """Columns of the table ``shares``; joints above on one side only are counted for pairs."""
 LOADS = (
@@ -121,7 +124,8 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         Campaigns. Joints are paired if both studies draw them by the same method from the same seed: an error then
         has the same random number in both, whatever its tolerance. Joints without a partner are then left out.
     by : list of str, optional
-        Load whose quantiles and mean are compared, such as cross1.F; repeatable; default: loads with limits.
+        Load or pattern, such as cross1.F or cross*.T, whose quantiles and mean are compared; repeatable; default: loads
+        with limits.
 
     Returns
     -------
@@ -175,7 +179,7 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
         Table("switched", "Pairs with one joint above a limit", (), switched),
         Table("changes", "Differences between the studies", (), keys),
-        *map(Sentence, _notes(both, differing, len(switched), apart)),
+        *map(Sentence, _notes(both, differing, rows, switched, apart)),
     ]
     return Answer("compare", "Two campaigns side by side", parts, {"paired": both.paired})
 
@@ -215,12 +219,20 @@ def sides(a: View, b: View) -> Sides:
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
     """Loads whose quantiles and means are compared, which both files keep: those asked for, else those with limits."""
     common, asked = _common(a, b), dict.fromkeys(by, "--by") or {name: f"limits.{name}" for name in limited}
+    found = {pattern: _selected(pattern, common) for pattern in asked}
     raise_all(
         Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(split(name)[0], common))
         for name, option in asked.items()
-        if split(name)[0] not in common
+        if not found[name]
     )
-    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in common]
+    names = list(dict.fromkeys(name for selected in found.values() for name in selected))
+    return names or [name for name in a.shown_loads if name in common]
+
+
+def _selected(pattern: str, common: Sequence[str]) -> list[str]:
+    """Loads that a name or pattern selects; each at the points that stand behind it."""
+    name, points = split(pattern)
+    return [f"{load} at {points}" if points else load for load in select(name, common)]
 
 
 def _common(a: View, b: View) -> list[str]:
@@ -251,9 +263,9 @@ def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
 
 
 def _notes(
-    both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switched: int, apart: Sequence[str]
+    both: Sides, differing: Sequence[tuple[list[str], Any, Any]], shares: Rows, switched: Rows, apart: Sequence[str]
 ) -> Iterator[str]:
-    """Differences between the studies, numbers of joints, and what the intervals leave out."""
+    """Differences between the studies, numbers of joints, what test and interval are, and what they leave out."""
     for side, view in zip("AB", both.views, strict=True):
         yield f"{side}: {view.path}"
     for keys, of_a, of_b in differing:
@@ -266,7 +278,9 @@ def _notes(
     a, b = map(len, both.samples)
     if both.paired:
         yield f"{a} pairs of joints with the same random numbers"
-        yield f"{switched} times only one joint of a pair is above a limit"
+        pairs = len({row["row"] for row in switched})
+        yield f"{pairs} pairs have only one joint above a limit; {len(switched)} such cases, limit by limit"
+        yield from _tests(shares)
     else:
         yield f"{a} and {b} joints with different random numbers"
     each = [Counts.of(view.status[joints]) for view, joints in zip(both.views, both.samples, strict=True)]
@@ -275,6 +289,18 @@ def _notes(
         yield f"{unresolved} joints without a valid load: left out; {bounds}"
     if not both.has_intervals:
         yield NO_INTERVALS
+
+
+def _tests(shares: Rows) -> Iterator[str]:
+    """What p and interval of pairs are, and the rows where one shows a difference and the other does not."""
+    known = [row for row in shares if not math.isnan(row["p"])]
+    if not known:
+        return
+    yield "McNemar's p: exact test of no difference; 95 % interval: approximate, by Clopper and Pearson's of both sides"
+    apart = [row for row in known if (row["p"] < SIGNIFICANT) != (row["lower"] > 0.0 or row["upper"] < 0.0)]
+    if apart:
+        more = f" and {len(apart) - 1} more" if len(apart) > 1 else ""
+        yield f"they disagree at {text.limit(apart[0])}{more}: whether there is a difference, the exact test says"
 
 
 def _in_words(value: object) -> str:

@@ -92,11 +92,13 @@ def parts(
         cells = {labels[k]: f"{text.value(of[k], units[name])}{beyond * bool(ratios[k] > 1.0)}" for k in shown}
         seen.append({"load or life": name, "limit": text.value(own, units[name])} | cells)
     columns = [Column(head, itemgetter(head)) for head in seen[0]]
-    found = Table("joints", "Loads and lives of the joints", columns, rows, seen=seen)
+    some = f"{len(shown)} of {len(labels)} joints{', nearest to a limit first' * bool(limits)}"
+    title = f"Loads and lives of {some if len(shown) < len(labels) else 'the joints'}"
+    found = Table("joints", title, columns, rows, seen=seen)
     if not limits:
         return [found]
     names = {labels[k]: [name for name, ratio in zip(values, use[:, k], strict=True) if ratio > 1.0] for k in nearest}
-    lacking = int(np.isnan(use[~np.isnan(limit[:, 0])]).any(axis=0).sum())
+    lacking = [labels[k] for k in np.flatnonzero(np.isnan(use[~np.isnan(limit[:, 0])]).any(axis=0)).tolist()]
     return [Sentence(_verdict(names, lacking), "lead"), found]
 
 
@@ -109,9 +111,17 @@ def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArr
     return dict(zip(names, rated(bearing, np.ones(1), [turning])[1].T, strict=True))
 
 
-def _verdict(names: Mapping[str, Sequence[str]], lacking: int) -> str:
-    """Joints beyond limits: ``Beyond a limit: 2 of 5 joints: line 2 (cross1.F, psi), line 5 (psi).``."""
+def _verdict(names: Mapping[str, Sequence[str]], lacking: Sequence[str]) -> str:
+    """Joints beyond limits: ``Beyond a limit: 2 of 5 joints: line 2 (cross1.F, psi), line 5 (psi).``.
+
+    Behind it those that are `lacking` a valid load or a rating.
+    """
     beyond = [f"{label} ({', '.join(own)})" for label, own in names.items() if own]
-    listed = f": {', '.join(beyond[:MOST])}{' and others' * (len(beyond) > MOST)}" if beyond else ""
-    without = f"; {lacking} without a valid load or a rating" if lacking else ""
+    listed = f": {_first(beyond)}" if beyond else ""
+    without = f"; {len(lacking)} without a valid load or a rating: {_first(lacking)}" if lacking else ""
     return f"Beyond a limit: {len(beyond) or 'none'} of {len(names)} joints{listed}{without}."
+
+
+def _first(labels: Sequence[str]) -> str:
+    """Join the first labels."""
+    return f"{', '.join(labels[:MOST])}{' and others' * (len(labels) > MOST)}"

@@ -14,6 +14,8 @@ from typing import Any
 from tolstat.common.errors import input_error
 from tolstat.common.late import tomlkit
 
+QUOTES = dict.fromkeys(map(ord, "\"'"))
+"""Quotes that TOML has around parts of a key: on the command line they may be there or not."""
 SETTABLE = ("joint", "operation", "sampling", "output")
 """Sections whose keys `with_settings` sets; a setting of the solver is one of ``run --retry``."""
 
@@ -72,6 +74,7 @@ def parsed(setting: str, place: str, example: str) -> tuple[list[str], Any]:
         When it is not a dotted key of a section with a value; `example` is the remedy.
     """
     name, _, value = setting.partition("=")
+    name = name.translate(QUOTES)
     path = [part.strip() for part in name.split(".")]
     if not (value.strip() and all(path) and len(path) > 1):
         raise input_error(place, "is not a setting", example)

@@ -171,7 +171,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
 
 
 def suggestion(pattern: str, names: Sequence[str]) -> str:
-    """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
+    """Remedy for a pattern that selects nothing: what it is if the half of it that is wrong is mended."""
     if remedy := without_joint(pattern, names):
         return remedy
     if key := giving(pattern):
@@ -182,8 +182,9 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     known = [name for name in every if _matches(feature, name)]
     if not known:
         rest = pattern.partition(".")[2]
-        return f"did you mean {rest!r}?" if rest in every or select(rest, names) else did_you_mean(feature, every)
-    return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]])
+        is_whole = rest in every or select(rest, names)
+        return f"did you mean {rest!r}?" if is_whole else did_you_mean(feature, every, "", pattern[len(feature) :])
+    return did_you_mean(key, [halves(name)[1] for name in names if halves(name)[0] == known[0]], f"{feature}.")
 
 
 def without_joint(pattern: str, names: Sequence[str]) -> str:

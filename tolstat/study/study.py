@@ -20,7 +20,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import Joint, Operation, affecting_results, mechanism_of
+from tolstat.joint import SPLINE, Joint, Operation, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
 from tolstat.study import points
@@ -135,7 +135,7 @@ class Study:
         return lined
 
     def check_mounting(self, idle_forces: bool = False) -> None:
-        """Refuse settings without effect, see `points.refusals`, and deviations that make friction negative.
+        """Refuse settings without effect, see `points.refusals`, and deviations that no joint can have.
 
         With `idle_forces` axial forces without effect are accepted.
 
@@ -144,7 +144,7 @@ class Study:
         InputError
             With every such setting.
         """
-        refused = [*points.refusals(self._settings, self._varied), *self._negative_friction()]
+        refused = [*points.refusals(self._settings, self._varied), *self._impossible()]
         raise_all([*([] if idle_forces else self.idle_forces), *self._faults(refused)])
 
     @property
@@ -155,20 +155,29 @@ class Study:
     def _faults(self, refused: Iterable[tuple[KeyPath, str, str]]) -> list[Fault]:
         return [self.fault(dotted(path), *texts) for path, *texts in refused]
 
-    def _negative_friction(self) -> Iterator[tuple[KeyPath, str, str]]:
-        """Deviations that take the friction of a joint below zero, as `points.refusals` yields what it refuses."""
+    def _impossible(self) -> Iterator[tuple[KeyPath, str, str]]:
+        """Deviations that take the friction of a joint below zero, and forces above that which a spline can hold."""
         mu = min((joint.friction.mu for joint in self.joints if joint.friction.mu is not None), default=math.inf)
-        key = MU.split(".")
-        cases, grid = (self.listed.cases, self.listed.points) if self.listed else ({}, ())
-        given: dict[KeyPath, float] = {("errors", *key): self.errors.get(MU, 0.0)}
-        given |= {("case", n - 1, "errors", *key): each.get(MU, 0.0) for n, each in enumerate(cases.values())}
-        given["grid", *key] = min((point.get(MU, 0.0) for point in grid), default=0.0)
-        models = [both for entry in self.entries for both in entry.models if both[0].name == MU]
-        given |= {("tolerances", *key): model.least(site) for site, model in models if isinstance(model, SingleEntry)}
-        for path, least in given.items():
+        for path, (least, _) in self._given(MU).items():
             if mu + least < 0.0:
                 found = f"takes friction.mu = {mu:g} of the joint down to {mu + least:.3g}, below zero"
                 yield path, found, f"give no deviation below {-mu:g}"
+        for path, ends in self._given(SPLINE).items():
+            if (largest := max(ends, key=abs)) and abs(largest) > 1.0:
+                found = f"reaches {largest:.3g}: the spline slides at its largest force, which is 1"
+                yield path, found, 'give values from -1 to 1, such as { plus_minus = 1, distribution = "uniform" }'
+
+    def _given(self, name: str) -> dict[KeyPath, tuple[float, float]]:
+        """Smallest and largest value of an error, by the key path of what gives it."""
+        key = name.split(".")
+        cases, grid = (self.listed.cases, self.listed.points) if self.listed else ({}, ())
+        given: dict[KeyPath, list[float]] = {("errors", *key): [self.errors.get(name, 0.0)]}
+        given |= {("case", n - 1, "errors", *key): [each.get(name, 0.0)] for n, each in enumerate(cases.values())}
+        given["grid", *key] = [point.get(name, 0.0) for point in grid] or [0.0]
+        models = [both for entry in self.entries for both in entry.models if both[0].name == name]
+        of_entries = [list(model.ends(site)) for site, model in models if isinstance(model, SingleEntry)]
+        given |= {("tolerances", *key): ends for ends in of_entries}
+        return {path: (min(values), max(values)) for path, values in given.items()}
 
     @property
     def known(self) -> tuple[Toleranced, ...]:

@@ -104,7 +104,9 @@ def _answer(view: View, standing: variations.Standing) -> Answer:
     """Table, notes and facts."""
     most = max(row["n"] for row in standing.rows)
     each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
-    title = f"Share above a limit with other values, and its change; {each}"
+    bases = {row["n"]: text.percent(row["drawn"]) for row in standing.rows}
+    told = ", ".join(f"{drawn} of {n}" for n, drawn in bases.items())
+    title = f"Share above a limit with other values, and its change from the same joints as drawn ({told}); {each}"
     intervals = (
         f"intervals of {100.0 * standing.confidence:.4g} % (95 % for all {len(standing.rows)} variations together), "
         "without the numerical error; a verdict turns if the interval of the share lies on the other side of the "

@@ -79,7 +79,8 @@ class Standing:
         ``yes``, ``no`` or ``open``: where that interval lies of the accepted share; empty without one.
     rows : sequence of mapping
         One row per variation, by the size of its effect: ``name``, ``label``, ``keys`` (text), ``because``, ``n``,
-        ``n_failed``, ``share`` and ``change`` (from the same joints as drawn) with ``_lower`` and ``_upper``, which
+        ``n_failed``, ``drawn`` (share of the same joints as drawn), ``share`` and ``change`` (from ``drawn``) with
+        ``_lower`` and ``_upper``, which
         cover sampling and joints without a valid load; ``moves``, whether the interval of the change excludes zero;
         ``side``, as above, of the variation; ``turns``, whether it turns the verdict: it moves the share, and its
         interval lies on the other side of the accepted share.
@@ -286,6 +287,7 @@ class _Joints(ChangedJoints):
 def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
     row: dict[str, Any] = variation._asdict() | {"keys": written(variation.keys)}
     row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
+    row |= {"drawn": _share(joints.base[: len(loads)], joints.level)}
     share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
         change = joints.difference(joints.base, loads, confidence)

@@ -199,10 +199,14 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
 
 
 def _why_unrated(lives: rating.Lives, joints: str) -> str:
-    each = " at each of its operating points" if len(lives.duty) > 1 else ""
-    whose = "a bearing of " if lives.of_shaft else ""
+    """Why `joints` have no rating; of a drive shaft with the joint whose bearings swing too little."""
+    each, who = " at each of its operating points" if len(lives.duty) > 1 else "", joints
+    if lives.of_shaft:
+        hours = lives.hours[np.isin(lives.view.status, VALID), : len(lives.pins)]
+        lacking = dict.fromkeys(lives.pins[k].partition(".")[0] for k in np.unique(np.argwhere(np.isnan(hours))[:, 1]))
+        who = f"in {joints} a bearing of {' or '.join(lacking)}"
     return (
-        f"{whose}{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from "
+        f"{who} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from "
         "which on the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not "
         "renewed there, and fretting, which no rating covers, is to be expected"
     )

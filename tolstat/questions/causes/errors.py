@@ -24,18 +24,19 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.options import Costs, Load, Top
 from tolstat.questions import shares
 from tolstat.questions.causes import lines, revolution
+from tolstat.questions.causes.shares import ENDS, check_scatter
 from tolstat.questions.causes.simulation import simulate as simulate
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
 
 SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
+MOST_WIDE = 90.0
+"""Width of an interval of a share, %, above which it says nothing."""
 SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
-MIN_JOINTS = 200
-"""Minimum number of valid joints."""
 MAX_JOINTS = sensitivity.MOST
 """Maximum number of joints (the first ones) for shares, and on either side of the tail: more add little, and
 a million joints with fifty errors do not fit into a gigabyte."""
@@ -62,8 +63,8 @@ class Indices(NamedTuple):
     facts : mapping
         ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares),
         ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
-        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
-        first-order indices.
+        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive`` with ``_lower`` and
+        ``_upper``: sum of the first-order indices.
     rows : sequence of mapping
         One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
         ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``direction`` and ``size``; the
@@ -148,7 +149,7 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     else:
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
-    parts += map(Sentence, _notes(of_errors, "" if view.altered else command))
+    parts += map(Sentence, _notes(of_errors, "" if view.altered else command, top))
     followed, m = revolution.followed(view, [load]), view.mechanism
     stored = [name for name in followed if held(view.store, histories_of([name], m))]
     parts += revolution.over_angle(view, stored)
@@ -180,7 +181,7 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
     command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
     for of_errors in each:
         parts.append(_table(f"errors_{of_errors.facts['load']}", of_errors, SHOWN))
-        parts += map(Sentence, _notes(of_errors, command))
+        parts += map(Sentence, _notes(of_errors, command, SHOWN))
     return Answer("causes", "Causes by error", parts)
 
 
@@ -210,10 +211,13 @@ def _table(name: str, of_errors: Indices, shown: int) -> Table:
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
-    rows = of_errors.rows
-    seen = [row for i, row in enumerate(rows) if i < shown or min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
     title = f"Scatter of {of_errors.quantity} over all joints, not of exceeding a limit, by error"
-    return Table(name, title, columns, rows, seen=seen)
+    return Table(name, title, columns, of_errors.rows, seen=_seen(of_errors.rows, shown))
+
+
+def _seen(rows: Rows, shown: int) -> list[Row]:
+    """Rows that people see, see `_table`."""
+    return [row for i, row in enumerate(rows) if i < shown or min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
 
 
 def _tail(row: Row, name: str) -> str:
@@ -221,16 +225,26 @@ def _tail(row: Row, name: str) -> str:
     return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"
 
 
-def _notes(of_errors: Indices, command: str) -> list[str]:
-    """Joints, explained variance, restrictions; `command` gives shares in all, empty if it has been run."""
+def _notes(of_errors: Indices, command: str, shown: int) -> list[str]:
+    """Joints, explained variance, restrictions; `command` gives shares in all, empty if it has been run.
+
+    `shown` is that of `_table`.
+    """
     facts, rows = of_errors
     unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
+    additive, low, high = (100 * facts[f"additive{end}"] for end in ENDS)
+    ends = "" if math.isnan(low) else f" ({low:.0f} .. {high:.0f} %{', too few joints' * (high - low > MOST_WIDE)})"
+    alone = f"errors alone explain {additive:.0f} %{ends} of the variance"
+    if number := len(rows) - len(seen := _seen(rows, shown)):
+        rest = additive - 100 * sum(row["first"] for row in seen)
+        alone += f", of which the {number} not shown {rest:+.0f} % (without effect they scatter about 0 %)"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
-    tail = f"; tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
+    level = "at least one limit" if facts["load"] == ANY_LIMIT else f"{facts['level']:.5g} {unit}".rstrip()
+    tail = f"; tail: {facts['above']} joints above {level}"
     notes = [
         f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
         f"standard deviation {std}",
-        f"errors alone explain {100 * facts['additive']:.0f} % of the variance{tail}",
+        f"{alone}{tail}",
     ]
     if (used := facts["used"]) < facts["joints"]:
         notes.append(f"shares are from the first {used} joints, the tail from at most as many on either side")
@@ -305,7 +319,7 @@ def indices(view: View, by: str, logarithm: bool = False, joints: int | None = N
     facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
     facts |= {"used": min(valid.size, MAX_JOINTS), "without_load": sum(load.unresolved)}
     facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
-    facts |= {"additive": float(first.estimate.sum())}
+    facts |= shares.with_ends("additive", first.additive)
     columns: dict[str, Any] = {"error": names}
     for kind in KINDS:
         estimates = parts[kind]._asdict() if kind in parts else {}
@@ -320,12 +334,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], P
     study, independent = view.study, view.design.independent
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
-    if values.size < MIN_JOINTS:
-        what = "load on all limits" if load.name == ANY_LIMIT else load.name
-        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {MIN_JOINTS} joints or more")
-    if np.ptp(values) == 0:
-        same = f"has the same {load.name} in all joints: no error causes it"
-        raise shares.unusable(view, same, "name another load with --by")
+    check_scatter(view, load)
     columns = sampling.columns(study)
     components = sampling.components(study, view.errors(samples[:MAX_JOINTS], columns))
     names = [name for name, values_of_error in components.items() if np.ptp(values_of_error) > 0]

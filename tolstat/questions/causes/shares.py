@@ -6,22 +6,26 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tolstat.analysis import difference, exchanged
+from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.mechanism import Mechanism
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, with_ends
+from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, unusable, with_ends
 from tolstat.store.view import View
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import of as prices_of
 from tolstat.study.tolerances.correlation import Group
 
+MIN_JOINTS = 200
+"""Minimum number of valid joints for causes by error."""
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
@@ -96,6 +100,22 @@ class Lines(NamedTuple):
         """Row of the line half as wide, or of the other fit, that lowers the share most; None if none surely does."""
         rows = [row for row in self.rows if is_decisive(row["step"]) and row["change_upper"] < 0.0]
         return min(rows, key=lambda row: float(row["share"]), default=None)
+
+
+def check_scatter(view: View, load: Sample) -> None:
+    """Refuse a load that has no causes among the errors: of too few joints, or without scatter.
+
+    Raises
+    ------
+    StoreError
+    """
+    if load.valid.size < MIN_JOINTS:
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
+        remedy = f"{MIN_JOINTS} are needed: tolstat extend {quote(str(view.path))} --n {MIN_JOINTS}"
+        raise unusable(view, f"has {load.valid.size} joints with a valid {what}", remedy)
+    if np.ptp(load.valid) == 0:
+        same = f"has the same {load.name} in all joints: no error causes it"
+        raise unusable(view, same, "name another load with --by")
 
 
 def is_decisive(step: str) -> bool:

@@ -17,13 +17,14 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.loads import ANY_LIMIT
-from tolstat.display.options import Load, Opt
+from tolstat.display.options import Costs, Load, Opt
 from tolstat.questions.causes import shares
 from tolstat.questions.shares import Simulation, check_sample, own_joints
 from tolstat.store import Writer
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-from tolstat.study import widths
+from tolstat.study import scaling, widths
+from tolstat.study.costs import of as prices_of
 from tolstat.study.tolerances.correlation import Group
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
@@ -47,6 +48,7 @@ def simulate(
     group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
     budget: Annotated[float, Opt("TIME", unit="s")] = BUDGET_S,
     most: Annotated[int, Opt("N", least=LEAST)] = MOST,
+    costs: Costs = None,
 ) -> list[Path]:
     """Simulate joints of a campaign with other widths of each line, and keep their loads in the file.
 
@@ -70,6 +72,8 @@ def simulate(
         With --run: time limit, with unit s, min or h; 5 min unless given.
     most : int
         With --run: largest number of joints of each change.
+    costs : Path, optional
+        As in `errors.causes`; a fault of the table is told before anything is simulated.
 
     Returns
     -------
@@ -81,13 +85,15 @@ def simulate(
     InputError
         With every fault of `group`, or when there is no such load.
     StoreError
-        When the file cannot be used, or was made by other code.
+        When the file cannot be used, was made by other code, or has too few valid joints for causes by error.
     """
     with Writer.open(path) as store, kept_workers():
         view = View(store)
         check_sample(view)
         load = by or view.decisive
-        view.load(load)  # which refuses what is none
+        shares.check_scatter(view, view.load(load))
+        if costs is not None:
+            prices_of(scaling.tolerances(view.study), view.mechanism, costs)
         sets.check_code(store)
         lines = [*LINES[each](view.study), *widths.named(view.study, group or ())]
         if not lines:

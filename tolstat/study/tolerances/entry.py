@@ -171,10 +171,10 @@ class SingleEntry(ToleranceEntry):
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""
 
-    def least(self, site: Site) -> float:
-        """Lower limit; where none is given, what one part in a thousand is below."""
-        band = self.band(site)
-        return float(self.build(site).ppf(_NEARLY_ALL)[0]) if band is None else band[0]
+    def ends(self, site: Site) -> tuple[float, float]:
+        """Limits; where none are given, what one part in a thousand is below, and above."""
+        low, high = self.band(site) or self.build(site).ppf(_NEARLY_ALL)
+        return float(low), float(high)
 
     def quantities(self, site: Site) -> dict[str, Distribution]:
         """See `ToleranceEntry.quantities`."""

@@ -212,6 +212,7 @@ def test_another_fit_gives_the_joints_of_the_study_with_that_fit(tmp_path, code,
 @pytest.mark.slow
 def test_loads_with_another_fit_are_those_of_the_study_with_that_fit(tmp_path, monkeypatch):
     """Kept in the file of the campaign, whose joint file is not there any more; simulated, not stood in for."""
+    monkeypatch.setattr(shares, "MIN_JOINTS", 2)
     monkeypatch.setattr(runner, "FIRST", 4)
     monkeypatch.setattr(runner, "LEAST", 4)
     own = tmp_path / "own.toml"

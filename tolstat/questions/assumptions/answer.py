@@ -106,14 +106,21 @@ def _answer(view: View, standing: variations.Standing) -> Answer:
     each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
     bases = {row["n"]: text.percent(row["drawn"]) for row in standing.rows}
     told = ", ".join(f"{drawn} of {n}" for n, drawn in bases.items())
-    title = f"Share above a limit with other values, and its change from the same joints as drawn ({told}); {each}"
+    title = f"Share above a limit with other values, and its change; {each}"
+    base = f"change: from the share of the same joints as drawn, {told}"
     intervals = (
         f"intervals of {100.0 * standing.confidence:.4g} % (95 % for all {len(standing.rows)} variations together), "
         "without the numerical error; a verdict turns if the interval of the share lies on the other side of the "
         "accepted share, and that of the change excludes zero"
     )
     idle = sentences.idle(standing)
-    notes = (intervals, idle, sentences.not_varied(standing, view.path.name), sentences.more(standing, view.path.name))
+    notes = (
+        base,
+        intervals,
+        idle,
+        sentences.not_varied(standing, view.path.name),
+        sentences.more(standing, view.path.name),
+    )
     table = Table("assumptions", title, COLUMNS, standing.rows, _UNITS)
     facts: dict[str, Any] = {"n": standing.n, "confidence": standing.confidence}
     facts |= dict(zip(("share", "lower", "upper"), standing.drawn, strict=True))

@@ -219,6 +219,8 @@ def test_friction_along_pins_that_have_none_around(folder: Path) -> None:
     study = STUDY.replace("own_joint.toml", "cirelli2021")
     (message,) = refused(folder, study.replace("[operation]", "friction = { mu = 0, mu_along = 0.1 }\n[operation]"))
     assert "joint.friction: 0.1 is friction along pins that have none around" in message
+    (message,) = refused(folder, study.replace("[operation]", "friction = { mu = 0.1, mu_along = 15 }\n[operation]"))
+    assert "joint.friction.mu_along: 15 is above 1" in message
 
 
 def test_keys_of_friction_without_its_coefficient(folder: Path) -> None:

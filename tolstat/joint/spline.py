@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
@@ -23,9 +23,10 @@ def _pitch(diameter: float) -> float:
     return diameter
 
 
-def _friction(mu: float) -> float:
+def _friction(mu: float, info: ValidationInfo) -> float:
     if mu > 1.0:
-        raise refuse("{mu} is above 1", "give the coefficient of friction, such as 0.05", "mu")
+        key = str(info.field_name)
+        raise refuse(f"{{{key}}} is above 1", "give the coefficient of friction, such as 0.05", key)
     return mu
 
 

@@ -53,7 +53,8 @@ def test_loads_come_back(path: Path, tmp_path: Path, caplog: pytest.LogCaptureFi
         for name in loads:
             again = np.array([float(found[i][name]) for i in valid])
             assert again.tobytes() == loads_of(CARDAN)[name].of(stored)[valid].tobytes(), name
-        assert "columns left out: row, nominal" in caplog.text
+        assert [row["joint"] for row in found] == [f"row {row}" for row in ROWS]
+        assert "columns left out: nominal" in caplog.text
         assert "alpha, speed, torque, axial_force" in caplog.text
 
 
@@ -92,8 +93,8 @@ def test_columns_that_are_left_out_and_joints_outside_the_model_are_told(
     text = ",".join([*names, "part", "status"]) + "\n" + ",".join([*cells, "A7", "ok"]) + "\n"
     (tmp_path / "x.csv").write_text(text, encoding="utf-8")
     evaluate(path, errors=tmp_path / "x.csv", out=str(tmp_path / "y.csv"), loads=["psi"])
-    assert rows_of(tmp_path / "y.csv") == [{"status": "outside_model", "psi": ""}]
-    assert "x.csv: columns left out: part, 1 of results" in caplog.text
+    assert rows_of(tmp_path / "y.csv") == [{"joint": "A7", "status": "outside_model", "psi": ""}]
+    assert "x.csv: columns left out: 1 of results" in caplog.text
     assert f"1 outside_model: {STATUS_TEXT[Status.OUTSIDE_MODEL]}" in caplog.text
     assert "errors are in m and rad" in caplog.text
     assert "hint: check the units" in caplog.text

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection
+from numbers import Integral
 from typing import Generic, TypeVar
 
 from tolstat.common.errors import input_error
@@ -70,9 +71,9 @@ def number_of_workers(workers: int | None) -> int:
     """
     if workers is None:
         return available_cores()
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
         raise input_error("workers", f"{workers!r} is no number of processes", "give a whole number of at least 1")
-    return workers
+    return int(workers)
 
 
 T = TypeVar("T")

@@ -209,10 +209,10 @@ class Study:
 
     @property
     def _varied(self) -> dict[str, list[str]]:
-        """Errors of operating point and shaft that scatter or are swept, to the sections in which they do."""
+        """Errors that scatter or are swept, to the sections in which they do."""
         grid = {name for point in self.listed.points for name in point} if self.listed else set()
         names = {"tolerances": self.tolerances, "sweep": [n for axis in self.sweep for n in axis.names], "grid": grid}
-        varied = [name for section in names.values() for name in section if name.startswith(("operation.", "shaft."))]
+        varied = [name for section in names.values() for name in section]
         return {name: [section for section in names if name in names[section]] for name in varied}
 
     @property

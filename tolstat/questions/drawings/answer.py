@@ -328,7 +328,11 @@ def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
             )
     if joint.shaft.unbalance is not None:
         shown.append(
-            ("shaft.unbalance", f"{1e6 * joint.shaft.unbalance.size:.5g} g*mm", "unbalance of the output shaft")
+            (
+                "shaft.unbalance",
+                f"{1e6 * joint.shaft.unbalance.size(joint.shaft.mass):.5g} g*mm",
+                "unbalance of the output shaft",
+            )
         )
     return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in shown]
 

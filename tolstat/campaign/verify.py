@@ -141,7 +141,10 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     done = pool.map_blocks(Work(partial(_reference, mechanism)), joints, min(workers, len(joints)))
-    results, counts = tables.without_results(len(joints), Status.CRASHED, mechanism), Counts(len(joints))
+    results, counts = (
+        tables.without_results(len(joints), Status.CRASHED, mechanism),
+        Counts(len(joints), noun=f"{mechanism.row}s"),
+    )
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:

@@ -192,7 +192,7 @@ def simulate(
     table = _Table(todo, asked, names, study.mechanism)
     blocks = _blocks(options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(study.mechanism, Options()), blocks, workers, stop)
-    counts, saved = Counts(table.status.size), time.monotonic()
+    counts, saved = Counts(table.status.size, noun=f"{study.mechanism.row}s"), time.monotonic()
     progress(counts)
     try:
         with closing(done):

@@ -200,7 +200,7 @@ class Reader:
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
-        counts = Counts(self.n * len(each), points=len(each))
+        counts = Counts(self.n * len(each), points=len(each), noun=f"{self.mechanism.row}s")
         for at_point in each:
             counts = counts.after(at_point.status())
         return counts

@@ -44,7 +44,7 @@ class ResultFile(Reader):
     def __repr__(self) -> str:
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"
-        joints = f"{self.n - self.first_sample} joints"
+        joints = f"{self.n - self.first_sample} {self.mechanism.row}s"
         progress = []
         for store in self.each():
             codes, numbers = np.unique(store.status(slice(self.first_sample, None)), return_counts=True)

@@ -241,11 +241,6 @@ class Mechanism(NamedTuple):
         return len(self.cardan) > 1
 
     @property
-    def row(self) -> str:
-        """What a row of tables is called in texts, see `common.wording`."""
-        return "shaft" if self.is_shaft else "joint"
-
-    @property
     def dof(self) -> int:
         """Number of unknowns."""
         return 6 * len(self.lumps) + len(self.unknowns)

@@ -19,6 +19,11 @@ _ROW = r"""(?<! [\w./\\*\[\]"'`=-] ) (?P<first>[Jj])oint(?P<several>s?) (?! [\w\
 """A row: no part of a name, a key, an option or a path."""
 
 
+def row_of(mechanism: Mechanism) -> str:
+    """What a row of a mechanism's tables is called."""
+    return "shaft" if mechanism.is_shaft else "joint"
+
+
 @dataclass(frozen=True)
 class Wording:
     """Tells a text that was written for joints.
@@ -26,7 +31,7 @@ class Wording:
     Attributes
     ----------
     word : str
-        What a row is called, see `Mechanism.row`.
+        What a row is called, see `row_of`.
     names : tuple of str
         Names by the user, which stay as they are.
     """
@@ -37,10 +42,11 @@ class Wording:
     @classmethod
     def of(cls, mechanism: Mechanism, study: str = "", names: Iterable[str] = ()) -> Wording:
         """Wording for a mechanism; `study` is the text of the study, whose names and values stay as they are."""
-        if mechanism.row == AS_WRITTEN.word:
+        word = row_of(mechanism)
+        if word == AS_WRITTEN.word:
             return AS_WRITTEN
         written = {*names, *_names_in(study)}
-        return cls(mechanism.row, tuple(sorted(name for name in written if "oint" in name and " " in name.strip())))
+        return cls(word, tuple(sorted(name for name in written if "oint" in name and " " in name.strip())))
 
     @property
     def title(self) -> str:

@@ -7,9 +7,10 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tolstat.common.mechanism import Mechanism
+if TYPE_CHECKING:
+    from tolstat.common.mechanism import Mechanism
 
 _JOINTS = r"""[Jj]oint\ [12]\b | (?i:both|between\ the|cardan|universal|slip|shaft\ of\ two)\ joints?\b
     | joint\ (?:files?|centre|shafts|or\ tolerances|without\ bearings|from\ its\ own\ dimensions)\b

@@ -32,7 +32,13 @@ KEPT = [
     *("joint1", "joint*.cross*.F", "joint.contact.law=sliced", "[joint.bearing]", "fork of joint 1, joint 2 of 6 deg"),
     *("both joints", "a Cardan joint", "Universal joints", "between the joints", "a drive shaft of two joints"),
     *("the joint file", "centre of the joint", "from the joint's centre", "contact.clearance of the joint"),
-    *("The joint from its own dimensions", "keys of the joint", "at the joint's speed and misalignment"),
+    *(
+        "The joint from its own dimensions",
+        "keys of the joint",
+        "add to [bearing] of the joint",
+        "give the joint friction.mu",
+        "at the joint's speed and misalignment",
+    ),
     *("--joints 24", "/data/joint/a.toml", "joints/pin25.toml", "joint.h5", "joints_per_lot", "'joint'", "shafts"),
 ]
 

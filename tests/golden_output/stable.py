@@ -19,7 +19,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     (r"^  (start|joints|shafts|check|report): (?:less than )?[\d.]+ (?:s|min|h)$", r"  \1: TIME"),
     (r"^memory: .*$", "memory: SIZE"),
     (
-        r"^.*\d of \d+ joints, (?:[^\n]*\n    )?[^\n]*(?:joint|shaft)s/s,[^\n]*(?:\n    [^\n]*)?\n",
+        r"^.*\d of \d+ (?:joint|shaft)s, (?:[^\n]*\n    )?[^\n]*(?:joint|shaft)s/s,[^\n]*(?:\n    [^\n]*)?\n",
         "",
     ),
     (r"^( *\"?wall_s\"?): [\d.e+-]+", r"\1: TIME"),

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from tolstat.common.mechanism import Mechanism
 
 _JOINTS = r"""[Jj]oint\ [12]\b | (?i:both|between\ the|cardan|universal|slip|shaft\ of\ two)\ joints?\b
-    | joint\ (?:files?|centre|shafts|or\ tolerances|without\ bearings|from\ its\ own\ dimensions)\b
-    | joint's\ (?:centre|speed)\b | (?:centre|keys|\w\.\w+)\ of\ the\ joint\b"""
+    | joint\ (?:files?|centre|shafts|or\ tolerances|without\ bearings|from\ its\ own\ dimensions|friction\.mu)\b
+    | joint's\ (?:centre|speed)\b | (?:centre|keys|\w\.\w+|\[\w+\])\ of\ the\ joint\b"""
 """What is said of one of the joints of a shaft, or of the nominal joint and its file."""
 _ROW = r"""(?<! [\w./\\*\[\]"'`=-] ) (?P<first>[Jj])oint(?P<several>s?) (?! [\w\\*\[\]"`=-] | /(?!s\b) | \.[\w*\[] )"""
 """A row: no part of a name, a key, an option or a path."""

@@ -179,7 +179,6 @@ def verify(
     out : Path, optional
         Write the errors of each joint, check and load as CSV.
     """
-    mechanism, method = _sampled(what)
     with progress("checks, then tight references") as shown:
         count = workers or available_cores()
         if near is None:
@@ -187,6 +186,7 @@ def verify(
         else:
             verification = library.checks.check_near(what, near, joints or library.numerical.LEAST_NEAR, count, shown)
     units = dict.fromkeys(("median", "usual", "worst"), "1")
+    mechanism, method = _sampled(what)
     is_sample = near is None and method in library.columns.DRAWN
     rows, by_load = (library.accuracy.error_rows(verification, mechanism, by_kind) for by_kind in (True, False))
     parts: list[library.answers.Part] = [

@@ -16,6 +16,7 @@ from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.bearing_life.lives import lives_of
 from tolstat.questions.drawings import answer as drawings
+from tolstat.questions.drawings import dimensions
 from tolstat.questions.drawings import shaft as picture
 from tolstat.questions.exceedance import curves
 from tolstat.solver import stationary
@@ -136,3 +137,35 @@ def test_shafts_are_drawn_as_they_are_arranged(of_study, arrangement, end):
     np.testing.assert_allclose(ends[2], (second * np.sin(first), 0.0, second * np.cos(first)), atol=1e-9)
     np.testing.assert_allclose(ends[3] - ends[2], np.linalg.norm(ends[3] - ends[2]) * np.array(end), atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(bearings[:2], axis=1), (70.0, 190.0))
+
+
+def test_the_table_has_the_shaft(of_study):
+    """Masses of the tubes: steel, 400 and 800 mm of 76 x 2.5 mm."""
+    values = {row["dimension"]: row["value"] for row in dimensions.dimensions(of_study.joint, of_study.points)}
+    mass = 7850 * np.pi / 4 * (0.076**2 - 0.071**2) * 0.4
+    assert values["shaft.alpha"] == "6 deg"
+    assert (values["shaft.arrangement"], values["shaft.offset"], values["shaft.length"]) == ("Z", "0 deg", "1200 mm")
+    assert (values["shaft.tube"], values["shaft.tube2"]) == tuple(f"76 x 2.5 mm, {m:.4g} kg" for m in (mass, 2 * mass))
+    assert (values["shaft.spline.at"], values["spline force"]) == ("400 mm", "3000 N")  # 2 mu T/d
+
+
+@pytest.mark.parametrize(
+    ("update", "expected"),
+    [
+        ({"alpha": np.radians(6)}, np.radians(8) ** 2 - np.radians(6) ** 2),
+        ({"alpha": np.radians(6), "arrangement": "W"}, np.radians(8) ** 2 - np.radians(6) ** 2),
+        ({"alpha": np.radians(8)}, 0.0),
+        ({"alpha": np.radians(8), "offset": np.pi / 2}, 2 * np.radians(8) ** 2),
+    ],
+)
+def test_second_order_of_the_output_speed(of_study, update, expected):
+    """Half of the difference of the squares of the angles; of their sum with forks a quarter turn out of phase."""
+    shaft = of_study.operation.shaft.model_copy(update=update)
+    operation = of_study.operation.model_copy(update={"shaft": shaft})
+    assert dimensions.second_order(of_study.joint, operation) == pytest.approx(0.5 * expected, rel=0.02, abs=1e-12)
+
+
+def test_a_shaft_is_drawn_as_a_whole(of_study):
+    titles = [ax.get_title("left") for ax in drawings.draw_joint(of_study.joint, of_study.operation).axes]
+    assert titles[:2] == ["The drive shaft, to scale", "The cross, seen from the output shaft"]
+    assert titles[2:] == ["joint1: Both shafts", "joint2: Both shafts"]

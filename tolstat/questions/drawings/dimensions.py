@@ -34,7 +34,7 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
     if shafts:
         names = _at(points)
         lines += [*_of_shaft(shafts[0].shaft), *_of_spline(shafts, names)]
-        waves = ", ".join(f"{100.0 * second_order(joint, operation):.3g}" for operation in shafts)
+        waves = ", ".join(f"{100.0 * round(second_order(joint, operation), 6):.3g}" for operation in shafts)
         lines.append(("output speed", f"{waves} %", f"amplitude of its second order by the angles alone{names}"))
     return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in lines]
 

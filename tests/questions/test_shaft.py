@@ -11,6 +11,7 @@ from tolstat import joint, study
 from tolstat.campaign.plan import Reversals, _reversals
 from tolstat.common.columns import result_columns
 from tolstat.common.errors import InputError
+from tolstat.common.loads import load_panels
 from tolstat.common.tables import Status, tables, without_results
 from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
@@ -169,3 +170,9 @@ def test_a_shaft_is_drawn_as_a_whole(of_study):
     titles = [ax.get_title("left") for ax in drawings.draw_joint(of_study.joint, of_study.operation).axes]
     assert titles[:2] == ["The drive shaft, to scale", "The cross, seen from the output shaft"]
     assert titles[2:] == ["joint1: Both shafts", "joint2: Both shafts"]
+
+
+def test_the_spline_carries_torque_and_not_only_bending(of_study):
+    titles = [panel.title for panel in load_panels((), of_study.mechanism)]
+    assert {"Spline, force", "Spline, torque and bending moment"} <= {*titles}
+    assert "Fork bushings, bending moment at the root" in titles

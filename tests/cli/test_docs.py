@@ -35,7 +35,7 @@ def test_without_a_page_the_names_of_all_are_printed() -> None:
     assert max(map(len, lines)) <= 80
     titles = dict(line.split(maxsplit=1) for line in lines if not line.startswith(" "))
     assert {"study", "tolerances", "causes", "bearing-life"} <= titles.keys()
-    assert titles["tutorial"] == "Your own joint"
+    assert titles["tutorial"] == "Your own drive shaft"
     assert "next: tolstat docs study" in done.stderr
 
 
@@ -49,8 +49,8 @@ def test_a_page_is_printed(name: str) -> None:
 
 def test_a_page_has_no_settings_of_the_site() -> None:
     shown = CliRunner().invoke(cli.app, ["docs", "tutorial"]).stdout
-    assert shown.startswith("# Your own joint")
-    assert "tolstat new shaft --joint own" in shown
+    assert shown.startswith("# Your own drive shaft")
+    assert "tolstat new truck --shaft --size" in shown
     assert not re.search(r"code-cell|:tags:|IPython|subprocess", shown)
 
 

@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -330,6 +331,18 @@ def test_what_is_inherited_beside_dimensions_of_one_s_own_is_a_warning(
     for key, words in expected.items():
         assert words in str(told[key])
         assert ("inherited from cirelli2021" in told[key].found) == (key not in ("cross.r_b", "material.G"))
+
+
+@pytest.mark.parametrize(
+    ("friction", "warned"),
+    [({"mu": 0.1}, True), ({"mu": 0.05}, False), ({"mu": 0.1, "mu_along": 0.05}, False), ({"radius": "12 mm"}, False)],
+)
+def test_friction_along_the_pins_that_is_inherited_beside_another_one_around_them(
+    friction: dict[str, Any], warned: bool
+) -> None:
+    told = [str(fault) for fault in joints.load("pin25", {"friction": friction}, "case").warnings()]
+    found = "friction.mu_along: 0.05 along the pins is inherited from pin25, beside mu = 0.1 around them"
+    assert [words.startswith(found) for words in told] == [True] * warned
 
 
 def test_given_values_silence_a_warning() -> None:

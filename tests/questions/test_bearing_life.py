@@ -140,6 +140,13 @@ def test_a_point_with_a_small_swing_is_rated_and_named():
     ]
 
 
+def test_points_with_small_swings_are_named_together():
+    notes = [note for note in said(swinging(cruise=10.0, start=11.0, climb=30.0), "note") if "by less than" in note]
+    assert [note.split(":")[0] for note in notes] == [
+        "at cruise, start, 66.7 % of the time, every joint swings by less than 12.4 deg to either side"
+    ]
+
+
 def test_a_point_below_half_the_critical_amplitude_counts_and_is_told_to_fret():
     made = swinging(cruise=3.0, climb=30.0)
     lives = lives_of(made)

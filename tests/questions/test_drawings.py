@@ -25,9 +25,10 @@ from tolstat.display import drawing
 from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
-from tolstat.questions.drawings import answer, views
+from tolstat.questions.drawings import answer, dimensions, views
 from tolstat.questions.drawings.views import FRONT, MEANINGS, SIDE
 from tolstat.store import ResultFile
+from tolstat.study.points import Point
 
 ALPHA = 0.3
 OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
@@ -187,14 +188,38 @@ def test_sizes_are_written_beside_the_drawing(cirelli):
     assert f"α = {np.degrees(ALPHA):.4g}°" in words[1]
 
 
+def table(joint, *points):
+    return {row["dimension"]: row["value"] for row in dimensions.dimensions(joint, points or [Point("", OPERATION)])}
+
+
 def test_the_table_has_what_a_joint_has_beside(cirelli):
     keys = {"input": {"bearings": ["70 mm", "190 mm"]}, "unbalance": {"amount": "400 g*mm", "angle": "0 deg"}}
-    joint = joints.load("pin25", {"shaft": keys}, "x.toml")
-    values = {row["dimension"]: row["value"] for row in answer.lengths(joint, [ALPHA])}
+    values = table(joints.load("pin25", {"shaft": keys}, "x.toml"))
     expected = {"thrust.end_play": "0.02 mm", "friction.mu": "0.004", "shaft.input.bearings": "70, 190 mm"}
     assert (expected | {"shaft.unbalance": "400 g*mm"}).items() <= values.items()
-    of_paper = {row["dimension"] for row in answer.lengths(cirelli, [ALPHA])}
-    assert not of_paper & (expected.keys() | {"shaft.output.bearings", "shaft.unbalance"})
+    assert not table(cirelli).keys() & (expected.keys() | {"shaft.output.bearings", "shaft.unbalance"})
+
+
+@pytest.mark.parametrize(
+    ("friction", "along"), [({"mu": 0.1}, "0.05"), ({"mu": 0.1, "mu_along": 0.2}, "0.2"), ({}, "0.05")]
+)
+def test_the_table_has_both_coefficients_of_friction(friction, along):
+    values = table(joints.load("pin25", {"friction": friction}, "x.toml"))
+    assert values["friction.mu"] == str(friction.get("mu", 0.004))
+    assert values["friction.mu_along"] == along
+
+
+def test_without_a_coefficient_along_the_pins_that_around_them_is_shown(cirelli):
+    joint = joints.load("cirelli2021", {"friction": {"mu": 0.08}}, "x.toml")
+    assert table(joint)["friction.mu_along"] == "0.08"
+
+
+def test_the_table_has_the_operating_points(cirelli):
+    slow = OPERATION.model_copy(update={"speed": 10.0 * np.pi, "torque": -75.0})
+    values = table(cirelli, Point("fast", OPERATION, 0.9), Point("slow", slow, 0.1))
+    assert values["operation.fast"] == "17.189 deg, 477.46 rpm, 100 N m"
+    assert values["operation.slow"] == "17.189 deg, 300 rpm, -75 N m"
+    assert "operation.alpha" not in values
 
 
 @pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])

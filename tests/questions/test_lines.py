@@ -344,7 +344,7 @@ def test_the_sentence_names_the_best_line_and_what_is_not_enough(changed):
     with ResultFile.open(changed) as store:
         found = shares.evaluate(store.view(), "cross1.F")
     best = question.sentence(found)
-    assert best.startswith("Halve the tilt tolerance of the pins (±0.5 deg) and ")
+    assert best.startswith("Halve the tilt tolerance of the pins about t (±0.5 deg) and ")
     assert best.endswith(" exceed the limit")
     answer = evaluated(changed)
     assert (answer.facts["sentence"], lead(answer).endswith(f" joints as drawn. {best}.")) == (best, True)

@@ -14,6 +14,7 @@ from tolstat import joint, study
 from tolstat.campaign.plan import Reversals, _reversals
 from tolstat.common.columns import result_columns
 from tolstat.common.errors import InputError
+from tolstat.common.loads import load_panels
 from tolstat.common.tables import Status, tables, without_results
 from tolstat.display import drawing
 from tolstat.display.answer import Panels, Sentence, Sheet, Table
@@ -21,6 +22,7 @@ from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.bearing_life.lives import lives_of
 from tolstat.questions.drawings import answer as drawings
+from tolstat.questions.drawings import dimensions
 from tolstat.questions.drawings import shaft as picture
 from tolstat.questions.exceedance import curves
 from tolstat.report.answer import report
@@ -165,3 +167,41 @@ def test_a_row_is_called_a_shaft(view, answer_of):
     assert any("shafts" in text for text in texts)
     assert [text for text in texts if re.search(r"\b[Jj]oints?\b(?! [12]\b|[.*])", text)] == []
     assert any("joint2" in text for text in texts)
+
+
+def test_the_table_has_the_shaft(of_study):
+    """Masses of the tubes: steel, 400 and 800 mm of 76 x 2.5 mm."""
+    values = {row["dimension"]: row["value"] for row in dimensions.dimensions(of_study.joint, of_study.points)}
+    mass = 7850 * np.pi / 4 * (0.076**2 - 0.071**2) * 0.4
+    assert values["shaft.alpha"] == "6 deg"
+    assert (values["shaft.arrangement"], values["shaft.offset"], values["shaft.length"]) == ("Z", "0 deg", "1200 mm")
+    assert (values["shaft.tube"], values["shaft.tube2"]) == tuple(f"76 x 2.5 mm, {m:.4g} kg" for m in (mass, 2 * mass))
+    assert (values["shaft.spline.at"], values["spline force"]) == ("400 mm", "3000 N")  # 2 mu T/d
+
+
+@pytest.mark.parametrize(
+    ("update", "expected"),
+    [
+        ({"alpha": np.radians(6)}, np.radians(8) ** 2 - np.radians(6) ** 2),
+        ({"alpha": np.radians(6), "arrangement": "W"}, np.radians(8) ** 2 - np.radians(6) ** 2),
+        ({"alpha": np.radians(8)}, 0.0),
+        ({"alpha": np.radians(8), "offset": np.pi / 2}, 2 * np.radians(8) ** 2),
+    ],
+)
+def test_second_order_of_the_output_speed(of_study, update, expected):
+    """Half of the difference of the squares of the angles; of their sum with forks a quarter turn out of phase."""
+    shaft = of_study.operation.shaft.model_copy(update=update)
+    operation = of_study.operation.model_copy(update={"shaft": shaft})
+    assert dimensions.second_order(of_study.joint, operation) == pytest.approx(0.5 * expected, rel=0.02, abs=1e-12)
+
+
+def test_a_shaft_is_drawn_as_a_whole(of_study):
+    titles = [ax.get_title("left") for ax in drawings.draw_joint(of_study.joint, of_study.operation).axes]
+    assert titles[:2] == ["The drive shaft, to scale", "The cross, seen from the output shaft"]
+    assert titles[2:] == ["joint1: Both shafts", "joint2: Both shafts"]
+
+
+def test_the_spline_carries_torque_and_not_only_bending(of_study):
+    titles = [panel.title for panel in load_panels((), of_study.mechanism)]
+    assert {"Spline, force", "Spline, torque and bending moment"} <= {*titles}
+    assert "Fork bushings, bending moment at the root" in titles

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tolstat.joint import sections
     from tolstat.questions import accuracy, joints
     from tolstat.questions.drawings import answer as drawings
+    from tolstat.questions.drawings import dimensions
     from tolstat.questions.exceedance import answer as exceedance
     from tolstat.questions.fatigue import loads as fatigue
     from tolstat.report import answer as reports
@@ -43,8 +44,8 @@ else:
     columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
     names = ("answer", "rewording", "style", "table", "text")
     answers, rewording, style, table, text = (Late(f"tolstat.display.{name}") for name in names)
-    names = ("accuracy", "joints", "drawings.answer", "exceedance.answer", "fatigue.loads")
-    accuracy, joints, drawings, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
+    names = ("accuracy", "joints", "drawings.answer", "drawings.dimensions", "exceedance.answer", "fatigue.loads")
+    accuracy, joints, drawings, dimensions, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
     names = ("report.answer", "report.page", "report.parts", "joint.sections")
     reports, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")

@@ -242,8 +242,9 @@ def show(
 ) -> None:
     """Draw a joint, its errors, or one joint of a campaign.
 
-    Draws cross, forks, bushings, pins in their holes and the axes e, t, z from the joint's own dimensions. Prints the
-    dimensions; with --errors the kinds of errors (to errors.svg), with --row the errors of that joint (to rowI.svg).
+    Draws cross, forks, bushings, pins in their holes and the axes e, t, z from the joint's own dimensions, and a drive
+    shaft as a whole. Prints the dimensions and the operating points; with --errors the kinds of errors (to
+    errors.svg), with --row the errors of that joint (to rowI.svg).
 
     Example: tolstat show studies/iso2768_f.toml --out joint.svg
 
@@ -271,16 +272,15 @@ def show(
     with gather(faults):
         check_target(target)
     raise_all(faults)
-    joint, alphas, title, own_errors = library.drawings.read(source, row, alpha)
+    drawn = library.drawings.read(source, row, alpha)
     if errors:
-        figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()
-    elif own_errors is not None:
-        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.drawings.numbers(joint, own_errors)
+        figure, rows = library.drawings.draw_errors(drawn.joint), library.drawings.meanings()
+    elif drawn.errors is not None:
+        figure = library.drawings.draw_row(drawn.joint, drawn.errors, drawn.title)
+        rows = library.drawings.numbers(drawn.joint, drawn.errors)
     else:
-        figure, rows = (
-            library.drawings.draw_joint(joint, alphas, title, columns),
-            library.drawings.lengths(joint, alphas),
-        )
+        figure = library.drawings.draw_joint(drawn.joint, drawn.points[0].operation, drawn.title, columns)
+        rows = library.dimensions.dimensions(drawn.joint, drawn.points)
     (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix,))
     echo(library.table.fitted(library.table.plain(rows), rows)[0])
     say(f"wrote {path}")

@@ -218,6 +218,9 @@ def load_panels(limited: Iterable[str], mechanism: Mechanism) -> list[LoadPanel]
     for group, kind in panels(mechanism):
         quantity, names = QUANTITY[kind.unit], names_of(group, kind, mechanism)
         title, words = f"{group.capitalize()} bushings, {quantity}", f"{quantity}s of the {group} bushings"
+        if group == "spline":  # T is the modulus about all axes, and a spline carries the torque
+            quantity = "force" if kind.unit == "N" else "torque and bending moment"
+            title, words = f"Spline, {quantity}", f"{quantity} of the spline"
         found.append(LoadPanel(f"{group}-{kind.symbol}", title, words, f"|{kind.symbol}|", kind.unit, names))
     for name in limited:
         if name not in shown_loads(mechanism):

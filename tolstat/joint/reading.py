@@ -209,6 +209,10 @@ def _inherited(
         inherited, value = _written(in_file[key], key, in_file[key]), _written(expected, key, in_file[key])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
+    along = in_file.get("friction.mu_along")
+    if "friction.mu" in given and "friction.mu_along" not in given and along not in (None, joint.friction.mu):
+        found = f"{along} along the pins is inherited from {path.stem}, beside mu = {joint.friction.mu:g} around them"
+        yield Fault("friction.mu_along", found, "give friction.mu_along, this value or another")
 
 
 def _lowered(joint: Joint, written: object) -> Iterator[Fault]:

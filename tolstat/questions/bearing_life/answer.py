@@ -218,9 +218,13 @@ def _angle(lives: rating.Lives, part: float = 1.0) -> str:
 
 def _at_points(lives: rating.Lives) -> Iterator[str]:
     """Sentences on points at which joints swing by less than the critical amplitude, and on a selection of points."""
+    alike: dict[tuple[int, int], list[str]] = {}
     for point, number in lives.short.items() if lives.unrated < lives.valid else ():
-        time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
-        where = f"at {point}{time} " if point else ""
+        alike.setdefault((number, lives.fretting.get(point, 0)), []).append(point)
+    for (number, fretting), points in alike.items():
+        share = text.percent(sum(lives.duty[point] for point in points))
+        time = f", {share} of the time," if len(lives.duty) > 1 else ""
+        where = f"at {', '.join(points)}{time} " if points[0] else ""
         swinging = "every joint swings" if number == lives.valid else f"{number} of {lives.valid} joints swing"
         if lives.of_shaft:
             swinging = f"a bearing of {swinging.removesuffix('s')}s"
@@ -228,7 +232,7 @@ def _at_points(lives: rating.Lives) -> Iterator[str]:
             f"{where}{swinging} by less than {_angle(lives)} to either side: the tracks of neighbouring needles do not "
             "overlap, and the life is that of the smaller volume that they stress"
         )
-        if fretting := lives.fretting.get(point, 0):
+        if fretting:
             joints = "they swing" if fretting == number else f"{fretting} of them swing"
             words += f". As {joints} by less than half of this, fretting, which no rating covers, may end it earlier"
         yield words

@@ -36,6 +36,8 @@ FITS_ON_PAGE = (
 COSTS_ON_PAGE = "tolstat causes FILE --costs TABLE prints what each change costs."
 _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 """Errors whose lines have a name in words."""
+_AXES = {"offset": ["e", "t", "z"], "tilt": ["t", "z"]}
+"""Axes of errors; a line that has some of them only names these."""
 _SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in shares.ENDS))
 
 
@@ -230,7 +232,10 @@ def _phrase(row: Row, mechanism: Mechanism) -> str:
     bodies = [word for word, names in every.items() if names <= features]
     if len(kinds) > 1 or not kinds <= _KINDS or features != set().union(*(every[word] for word in bodies)):
         return f'tolerance "{row["line"]}"' if "." in row["line"] else f"tolerances of {row['line']}"
-    return f"{kinds.pop()} tolerance of the {' and '.join(bodies)}"
+    kind, axes = kinds.pop(), sorted({name.rpartition("_")[2] for name in row["names"]})
+    some = kind in _AXES and axes != _AXES[kind]
+    of_axes = f" {'along' if kind == 'offset' else 'about'} {' and '.join(axes)}" if some else ""
+    return f"{kind} tolerance of the {' and '.join(bodies)}{of_axes}"
 
 
 def _tornado(changed: shares.Lines, accepted: float) -> Panel:

@@ -1,11 +1,12 @@
-"""What a joint looks like: the joint on the page, with the place of a load marked; figures and tables of any joint."""
+"""What a joint looks like: the joint on the page, the place of a load marked; figures of a joint and its errors."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, R
 from tolstat.questions.drawings import shaft, views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
+from tolstat.study.points import Point
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings, pins and shafts of the leading loads. Loads of cross1–4 "
@@ -152,9 +154,28 @@ def _errors_of(joint: joints.Joint, errors: NDArray[np.void], title: str, key: s
     return panels
 
 
-def read(
-    source: str | Path, row: int | None = None, alpha: str | None = None
-) -> tuple[joints.Joint, list[float], str, NDArray[np.void] | None]:
+class Drawn(NamedTuple):
+    """What a source holds to be drawn.
+
+    Attributes
+    ----------
+    joint : Joint
+        The nominal joint; of a result file that of its first slot, or of the row.
+    points : list of Point
+        Its operating points, the first of which is drawn; of a joint file one of a misalignment alone.
+    title : str
+        A headline.
+    errors : ndarray, shape (1,), dtype ERROR, or None
+        Errors of the row.
+    """
+
+    joint: joints.Joint
+    points: list[Point]
+    title: str
+    errors: NDArray[np.void] | None = None
+
+
+def read(source: str | Path, row: int | None = None, alpha: str | None = None) -> Drawn:
     """Read the joint to be drawn.
 
     Parameters
@@ -164,66 +185,61 @@ def read(
     row : int, optional
         Row of the campaign whose errors are drawn; of a result file.
     alpha : str, optional
-        Misalignment in place of the source's own, ``"20 deg"``, of drive shafts that of the first; a joint file has
-        none: 15 deg by default.
-
-    Returns
-    -------
-    joint : Joint
-        The nominal joint; of a result file that of its first slot, or of the row.
-    alphas : list of float
-        Its misalignment, rad, of drive shafts that of each; of several operating points those of the first.
-    title : str
-        A headline.
-    errors : ndarray, shape (1,), dtype ERROR, or None
-        Errors of the row.
+        Misalignment in place of the source's own at its first operating point, ``"20 deg"``, of drive shafts that of
+        joint 1; a joint file has none: 15 deg by default.
 
     Raises
     ------
     InputError, StoreError
         When there is no such joint, row or misalignment, or a file cannot be read.
     """
-    path, errors, point = Path(source), None, ""
-    asked_alpha = validate(
-        joints.Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha"
-    ).alpha
+    path = Path(source)
+    asked = validate(joints.Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha")
     if path.is_file() and path.suffix.lower() != ".toml":
-        with ResultFile.open(path) as store:
-            if row is not None and row not in store.rows:
-                holds = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
-                remedy = f"give one of these rows, for example --row {store.rows[0]}"
-                raise InputError([Fault(str(path), holds, remedy)])
-            first, slot, title = store.each()[0], 0 if row is None else store.slot(row), store.study_name
-            joint = recorded.joint_of(store, slot)
-            alphas = list(recorded.operation_of(first, slot).alphas)
-            if row is None:
-                point = first.point or ""
-            else:
-                errors, title = store.errors(slice(slot, slot + 1)), f"{title}, row {row}"
+        drawn = _of_results(path, row)
     elif row is not None:
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
     elif path.suffix.lower() == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
         case = study.load(path) if "sampling" in data else study.load_case(path)
-        joint, title = case.joint, path.stem
-        alphas = list(case.operation.alphas)
-        point = case.points[0].name if isinstance(case, study.Study) else ""
+        points = list(case.points) if isinstance(case, study.Study) else [Point("", case.operation)]
+        drawn = Drawn(case.joint, points, path.stem)
     else:
-        joint, alphas = joints.load(source, {}, str(source)), [asked_alpha]
-        title = joint.description or path.stem
+        joint = joints.load(source, {}, str(source))
+        drawn = Drawn(joint, [Point("", asked)], joint.description or path.stem)
+    first = drawn.points[0]
     if alpha:
-        alphas[0] = asked_alpha
-    return joint, alphas, f"{title}, at {point}" if point else title, errors
+        operation = first.operation.model_copy(update={"alpha": asked.alpha})
+        drawn = drawn._replace(points=[first._replace(operation=operation)])
+    at = f", at {first.name}" if first.name and row is None else ""
+    return drawn._replace(title=f"{drawn.title}{at}")
 
 
-def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str = "", columns: int = 2) -> Figure:
+def _of_results(path: Path, row: int | None) -> Drawn:
+    """Joint of a result file, or of one of its rows."""
+    with ResultFile.open(path) as store:
+        if row is not None and row not in store.rows:
+            holds = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
+            remedy = f"give one of these rows, for example --row {store.rows[0]}"
+            raise InputError([Fault(str(path), holds, remedy)])
+        slot = 0 if row is None else store.slot(row)
+        points = [
+            point._replace(operation=recorded.operation_of(at, slot))
+            for at, point in zip(store.each(), store.points.values(), strict=True)
+        ]
+        errors = None if row is None else store.errors(slice(slot, slot + 1))
+        title = store.study_name if row is None else f"{store.study_name}, row {row}"
+        return Drawn(recorded.joint_of(store, slot), points, title, errors)
+
+
+def draw_joint(joint: joints.Joint, at: float | joints.Operation, title: str = "", columns: int = 2) -> Figure:
     """Draw a joint from its dimensions: the cross in its holes, both shafts, bushings, dimensions.
 
     Parameters
     ----------
     joint : Joint
         The nominal joint, such as ``study.joint``.
-    alpha : float or sequence of float
-        Misalignment, rad; of drive shafts that of each.
+    at : float or Operation
+        Misalignment, rad; or the operating point, such as ``study.operation``: a drive shaft is drawn as a whole, too.
     title : str
         Headline; the joint's description by default.
     columns : int
@@ -234,10 +250,12 @@ def draw_joint(joint: joints.Joint, alpha: float | Sequence[float], title: str =
     matplotlib.figure.Figure
         Its parts have their names as ids in an SVG.
     """
-    alphas = np.atleast_1d(alpha).tolist()
-    names = [f"joint{i}." for i in range(1, len(alphas) + 1)] if len(alphas) > 1 else [""]
-    each = [_named(views.views(joint, own), name) for own, name in zip(alphas, names, strict=True)]
-    panels = list(chain.from_iterable(each))
+    if isinstance(at, joints.OperationOfShaft):
+        each = [views.views(joint, alpha) for alpha in at.alphas]
+        sides = [_named(panels, f"joint{number}.")[1] for number, panels in enumerate(each, 1)]
+        panels = [shaft.picture(joint, at), each[0][0], *sides]
+    else:
+        panels = list(views.views(joint, at.alpha if isinstance(at, joints.Operation) else at))
     return drawing.sheet(panels, title or joint.description or "Cardan joint", NOTES, columns)
 
 
@@ -292,49 +310,6 @@ def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
         own = views.numbers(joint, views.errors_in(joint, errors, before))
         rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
     return rows
-
-
-def lengths(joint: joints.Joint, alphas: Sequence[float]) -> Rows:
-    """Dimensions of a joint, and what else it has: ``dimension``, ``value`` with its unit, ``meaning``."""
-    arm, contact = joint.arm, joint.contact
-    rows = [
-        ("cross.R", joint.cross.R, "centre of the joint to the middle of pin and hole"),
-        ("cross.r_b", joint.cross.r_b, "centre of the joint to a cross bushing"),
-        ("arm.l_f", arm.l_f, "middle of a hole to a fork bushing, along the shaft"),
-        ("contact.D_P", contact.D_P, "diameter of the pins"),
-        ("contact.D_H", contact.D_H, "diameter of the holes"),
-        ("clearance", 0.5 * (contact.D_H - contact.D_P), "radial clearance"),
-        ("contact.z", contact.z, "length of the contact"),
-        ("pin.d", joint.pin.d, "diameter of a pin's beam"),
-        ("pin.l", joint.pin.l, "length of a pin's beam"),
-        ("arm.width", arm.width, "side of an arm's section along t"),
-        ("arm.depth", arm.depth, "side of an arm's section along e"),
-        ("arm.d", arm.d, "diameter of a round arm"),
-    ]
-    shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
-    for key, alpha in zip(("operation.alpha", "shaft.alpha"), alphas, strict=False):
-        shown.append((key, f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
-    if joint.thrust is not None:
-        shown.append(
-            ("thrust.end_play", f"{1e3 * joint.thrust.end_play:.5g} mm", "play of the cross between its faces")
-        )
-    if joint.friction.mu is not None:
-        shown.append(("friction.mu", f"{joint.friction.mu:.5g}", "coefficient of friction of the pins"))
-    for end, borne in (("input", joint.shaft.input), ("output", joint.shaft.output)):
-        if borne is not None:
-            places = ", ".join(f"{1e3 * place:.5g}" for place in borne.bearings)
-            shown.append(
-                (f"shaft.{end}.bearings", f"{places} mm", f"bearings of the {end} shaft from the joint's centre")
-            )
-    if joint.shaft.unbalance is not None:
-        shown.append(
-            (
-                "shaft.unbalance",
-                f"{1e6 * joint.shaft.unbalance.size(joint.shaft.mass):.5g} g*mm",
-                "unbalance of the output shaft",
-            )
-        )
-    return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in shown]
 
 
 def meanings() -> Rows:

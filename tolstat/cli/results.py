@@ -76,7 +76,7 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         shares = [row for table in tables[:1] for row in table.rows]
         print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
-    echo(told("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))])))
+    echo("\n".join([*map(told, _lines(facts)), *(wrapped(told(text)) for text in library.remedy.in_words(reasons))]))
     for table in answered(library.answers.Answer("status", "", tables[:1])).tables.values():
         echo()
         print_table(table.columns, table.for_people, wide)

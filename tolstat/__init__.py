@@ -16,7 +16,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tolstat.questions import PUBLIC
+from tolstat.questions import PUBLIC, told
 
 if TYPE_CHECKING:
     from tolstat.campaign.function import function as function
@@ -77,7 +77,7 @@ def __getattr__(name: str) -> Any:
     value: Any = import_module(home)
     for part in path.split("."):
         value = getattr(value, part)
-    return value
+    return told(value) if name in PUBLIC else value
 
 
 def __dir__() -> list[str]:

@@ -100,7 +100,7 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
 
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(OSError, match="No space"):
-        html.write(SimpleNamespace(sections=[]), tmp_path / "page.html")
+        html.write(SimpleNamespace(sections=[], wording=str), tmp_path / "page.html")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
     assert (tmp_path / "page.html").read_bytes() == b"the old one"
 

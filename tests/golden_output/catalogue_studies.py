@@ -119,6 +119,7 @@ TRUCK = Campaign(
     ["run shaft.toml --n 24"],
     {
         "report": ["report shaft.h5 --wide --accept '30 %'"],
+        "page": ["report shaft.h5 --out page.html --accept '30 %' --replay 20"],
         "worst": ["worst shaft.h5 --top 3"],
         "bearing_life": ["bearing-life shaft.h5"],
     },

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support import naive
-from tests.support.held import FACES, FREE, FRICTION, drive_shaft, held
+from tests.support.held import FACES, FREE, FRICTION, TUBE, drive_shaft, held
 from tests.support.kernel_states import dense
 from tolstat import joint as joints
 from tolstat.common.load_kinds import spans
@@ -18,7 +18,10 @@ from tolstat.kernel.mechanics.work import FORCE, make_work
 OPTIONS = Options()
 WHOLE = {"thrust": FACES | {"end_play": "0 mm"}, "friction": FRICTION, "shaft": FREE}
 ACROSS = {"lateral": "2e7 N/m", "mass": "5 kg", "unbalance": {"amount": "1e-3 kg*m", "angle": "30 deg"}}
-MECHANISMS = pytest.mark.parametrize("drive", [None, drive_shaft(0.2, offset="0.1 rad")], ids=["joint", "shaft"])
+THROWN = TUBE | {"unbalance": {"amount": "2e-3 kg*m", "angle": "50 deg"}}
+MECHANISMS = pytest.mark.parametrize(
+    "drive", [None, drive_shaft(0.2, offset="0.1 rad", tube=THROWN)], ids=["joint", "shaft"]
+)
 
 
 def state(seed: int, drive: joints.DriveShaft | None = None, turned: float = 5e-3, **sections):

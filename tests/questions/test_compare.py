@@ -207,7 +207,7 @@ def test_loads_by_a_pattern_and_where_test_and_interval_disagree(tmp_path):
     told = [note for note in notes_of(answer) if "disagree at" in note]
     assert told == ["they disagree at cross1.F > 700 N and 1 more: whether there is a difference, the exact test says"]
     pairs = {row["row"] for row in answer.frame("switched").to_dict("records")}
-    assert f"{len(pairs)} pairs have only one joint above a limit; " in "\n".join(notes_of(answer))
+    assert f"{len(pairs)} pairs have a limit that only one of their joints exceeds; " in "\n".join(notes_of(answer))
 
 
 def test_loads_that_were_not_asked_for_need_not_be_in_both_files(tmp_path):

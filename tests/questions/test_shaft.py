@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+import tolstat
 from tests.support.environment import ROOT
 from tests.support.views import FakeStore
 from tolstat import joint, study
@@ -13,6 +16,8 @@ from tolstat.common.columns import result_columns
 from tolstat.common.errors import InputError
 from tolstat.common.loads import load_panels
 from tolstat.common.tables import Status, tables, without_results
+from tolstat.display import drawing
+from tolstat.display.answer import Panels, Sentence, Sheet, Table
 from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.bearing_life.lives import lives_of
@@ -20,6 +25,7 @@ from tolstat.questions.drawings import answer as drawings
 from tolstat.questions.drawings import dimensions
 from tolstat.questions.drawings import shaft as picture
 from tolstat.questions.exceedance import curves
+from tolstat.report.answer import report
 from tolstat.solver import stationary
 from tolstat.store.view import View
 from tolstat.study import changes
@@ -138,6 +144,29 @@ def test_shafts_are_drawn_as_they_are_arranged(of_study, arrangement, end):
     np.testing.assert_allclose(ends[2], (second * np.sin(first), 0.0, second * np.cos(first)), atol=1e-9)
     np.testing.assert_allclose(ends[3] - ends[2], np.linalg.norm(ends[3] - ends[2]) * np.array(end), atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(bearings[:2], axis=1), (70.0, 190.0))
+
+
+def shown(answer):
+    """All words of an answer that people see: sentences, tables, and the pictures with their titles."""
+    for part in answer.parts:
+        if isinstance(part, Sentence):
+            yield part.text
+        elif isinstance(part, Table):
+            yield part.title
+            yield from (text for column in part.shown for text in (column.head, *map(column.cell, part.for_people)))
+        elif isinstance(part, Panels | Sheet):
+            panels = part.panels if isinstance(part, Panels) else ()
+            yield from (text for panel in panels for text in (panel.title, panel.description))
+            figure = drawing.sheet(panels) if panels else part.draw()
+            yield from (artist.get_text() for artist in figure.findobj(lambda artist: hasattr(artist, "get_text")))
+
+
+@pytest.mark.parametrize("answer_of", [report, tolstat.exceedance, tolstat.bearing_life, tolstat.quantiles])
+def test_a_row_is_called_a_shaft(view, answer_of):
+    texts = list(shown(answer_of(view((15.0, 2.0)))))
+    assert any("shafts" in text for text in texts)
+    assert [text for text in texts if re.search(r"\b[Jj]oints?\b(?! [12]\b|[.*])", text)] == []
+    assert any("joint2" in text for text in texts)
 
 
 def test_the_table_has_the_shaft(of_study):

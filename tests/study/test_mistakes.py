@@ -161,8 +161,8 @@ BEARINGS, TABLE = 'for example bearings = ["80 mm", "240 mm"]', "is not a table\
         ('output = "free"', "'free' is not a table\n  hint: write shaft.axial = \"free\""),
         ('output = "1 m"', f'\'1 m\' {TABLE} output = {{ bearings = ["80 mm", "240 mm"] }}'),
         ('unbalance = "5 g*mm"', f"'5 g*mm' {TABLE} unbalance = {{ amount = "),
-        ("unbalance = {}", "has neither amount nor grade, mass and speed\n  hint: give amount = "),
-        ('unbalance.grade = "16 mm/s"', "has grade without mass and speed\n  hint: add mass and speed, or give amount"),
+        ("unbalance = {}", "has neither amount nor grade and speed\n  hint: give amount = "),
+        ('unbalance.grade = "16 mm/s"', "has grade without speed\n  hint: add speed, or give amount"),
         ('unbalance = { amount = "1 g*mm", mass = "5 kg" }', "has amount beside mass\n  hint: remove amount, or mass"),
     ],
 )

@@ -355,15 +355,28 @@ def inertias(attitude, par, mechanism):
 
 
 def applied(t, par, mechanism):
-    """World force and torque on each lump that no other body causes: weight, and the resisting torque, (lumps, 6)."""
+    """World force and torque on each lump that no other body causes, (lumps, 6): weight, unbalance, torque."""
     found = np.zeros((len(mechanism.lumps), 6))
     if mechanism.placed:
         kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
         found[:, :3] = np.multiply.outer(par.mass[kinds], par.weight)
+    found[:, :3] += thrown(t, par, mechanism)[: len(found)]
     if mechanism.loaded:
         loaded = mechanism.bodies.index(mechanism.loaded)
         axis = ideal_attitudes(t, par, mechanism)[loaded] @ Z
         found[loaded, 3:] = -resisting_torque(par.omega * t, par) * axis
+    return found
+
+
+def thrown(t, par, mechanism):
+    """World force of the unbalance of each body, (bodies, 3): it turns with the body's ideal frame."""
+    found = np.zeros((len(mechanism.bodies), 3))
+    if mechanism.unbalanced:
+        attitudes, still = ideal_attitudes(t, par, mechanism), np.zeros(mechanism.dof)
+        spins = motion(t, still, still, still, par, mechanism).spin
+        for unbalance, name in zip(par.unbalance, mechanism.unbalanced, strict=True):
+            body = mechanism.bodies.index(name)
+            found[body] = attitudes[body] @ (*unbalance, 0.0) * (spins[body] @ attitudes[body][:, 2]) ** 2
     return found
 
 
@@ -388,13 +401,11 @@ def on_shafts(t, force, q, v, par, mechanism):
 
 
 def across_shaft(t, q, v, k, own, par, mechanism):
-    """Force across shaft k along x and y of its frame: of its arms, of its unbalance, of springs in the ground."""
+    """Force across shaft k along x and y of its frame: of its arms, of unbalance, of springs in the ground."""
     lumps = len(mechanism.lumps)
     attitude, now = ideal_attitudes(t, par, mechanism)[lumps + k], motion(t, q, v, 0 * q, par, mechanism)
     moved = now.bodies.position[lumps + k] - origins(t, par, mechanism)[lumps + k]
-    world = own[k, :3] - par.k_l * moved - par.c_l * now.velocity[lumps + k]
-    if mechanism.unbalance:
-        world = world + attitude @ (*par.unbalance, 0.0) * (now.spin[lumps + k] @ attitude[:, 2]) ** 2
+    world = own[k, :3] - par.k_l * moved - par.c_l * now.velocity[lumps + k] + thrown(t, par, mechanism)[lumps + k]
     return attitude.T @ world
 
 

@@ -25,8 +25,8 @@ class FakeStore(Reader):
         self.path, self.study_name, self.study_text = Path("made_up.h5"), "made up", study_text
         self.sampling = {"method": method, "nominal_first": True, "n": len(errors) - 1}
         self.limits, self.columns, self.mechanism = limits, columns, CARDAN
-        self.variants, self.joint, self.identity = (), joint, {}
-        self.options = Options()._asdict()
+        self.variants, self.case_names, self.joint, self.identity = (), (), joint, {}
+        self.options, self.fidelity, self.stop = Options()._asdict(), {"reason": ""}, {}
         self._errors, self._results = errors, results if isinstance(results, dict) else {"": results}
         self.points = {name: Point(name, OPERATION, 1.0 / len(self._results)) for name in self._results}
         self.point = next(iter(self.points)) if len(self.points) == 1 else None

@@ -26,7 +26,7 @@ MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
 WITHOUT_RESULTS = {
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
-    Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
+    Status.INVALID_INPUT: "a parameter is not finite, or shaft.spline not from -1 to 1: check the errors",
     Status.OUTSIDE_MODEL: "check the units (errors in tables are in m and rad), else change joint or tolerances",
 }
 """Remedies that do not depend on the results of the joint."""

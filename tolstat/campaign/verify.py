@@ -28,6 +28,7 @@ from tolstat.common.errors import Fault, InputError, gather, input_error, raise_
 from tolstat.common.loads import load_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
+from tolstat.common.wording import row_of
 from tolstat.sampling import draw
 from tolstat.solver.reference import reference_rows
 from tolstat.store import Reader, Writer, verification
@@ -141,7 +142,10 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     done = pool.map_blocks(Work(partial(_reference, mechanism)), joints, min(workers, len(joints)))
-    results, counts = tables.without_results(len(joints), Status.CRASHED, mechanism), Counts(len(joints))
+    results, counts = (
+        tables.without_results(len(joints), Status.CRASHED, mechanism),
+        Counts(len(joints), noun=f"{row_of(mechanism)}s"),
+    )
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:

@@ -18,6 +18,7 @@ from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Status, worst_status
+from tolstat.common.wording import row_of
 from tolstat.joint import perturb
 from tolstat.store import Reader, Writer, what_if
 from tolstat.store.hdf5 import store_error
@@ -192,7 +193,7 @@ def simulate(
     table = _Table(todo, asked, names, study.mechanism)
     blocks = _blocks(options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(study.mechanism, Options()), blocks, workers, stop)
-    counts, saved = Counts(table.status.size), time.monotonic()
+    counts, saved = Counts(table.status.size, noun=f"{row_of(study.mechanism)}s"), time.monotonic()
     progress(counts)
     try:
         with closing(done):

@@ -29,8 +29,8 @@ from typing import Annotated, Any, get_args, get_origin
 
 import typer
 
-from tolstat.cli._library import points, stores, studies, units
-from tolstat.cli._shared import deliver, fail, progress, session, work
+from tolstat.cli._library import points, stores, units
+from tolstat.cli._shared import deliver, fail, loaded, opened, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
@@ -246,8 +246,10 @@ def function_of(question: Question) -> Callable[..., None]:
         if simulate is not None and (is_study or question.at_once or arguments.get("run")):
             what: Any = sources[0]
             if is_study:
-                what = studies.load(sources[0])
+                what = loaded(sources[0])
                 points.names_of(point, [at.name for at in what.points], str(sources[0]))
+            else:
+                opened(sources[0]).close()  # its joints, or shafts, are told of from the first message on
             workers, folder = arguments["workers"], out or Path()
             with work(workers=workers, folder=folder, study_file=study_file, point=point) as running:
                 sources = simulate(what, running, **{p.name: arguments[p.name] for p in simulated})
@@ -256,9 +258,9 @@ def function_of(question: Question) -> Callable[..., None]:
             holds = f"about a simulation, and {sources[0]} holds its joints already"
             raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {holds}", remedy)])
         with ExitStack() as stack:
-            opened = [stack.enter_context(stores.ResultFile.open(path)) for path in sources]
-            point = "" if is_study and len(opened[0].points) == 1 else point  # the one that was simulated
-            seen = [store.view(study_file).at(point) for store in opened]
+            files = [stack.enter_context(opened(path)) for path in sources]
+            point = "" if is_study and len(files[0].points) == 1 else point  # the one that was simulated
+            seen = [store.view(study_file).at(point) for store in files]
             with progress(question.name):
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
             target = out and (out if only_study else out / stem)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
     from tolstat.display import answer as answers
-    from tolstat.display import style, table, text
+    from tolstat.display import rewording, style, table, text
     from tolstat.joint import sections
     from tolstat.questions import accuracy, joints
     from tolstat.questions.drawings import answer as drawings
@@ -42,7 +42,8 @@ else:
     )
     names = ("columns", "loads", "strict", "tables", "units")
     columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
-    answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
+    names = ("answer", "rewording", "style", "table", "text")
+    answers, rewording, style, table, text = (Late(f"tolstat.display.{name}") for name in names)
     names = ("accuracy", "joints", "drawings.answer", "drawings.dimensions", "exceedance.answer", "fatigue.loads")
     accuracy, joints, drawings, dimensions, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
     names = ("report.answer", "report.page", "report.parts", "joint.sections")

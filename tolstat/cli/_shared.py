@@ -22,7 +22,10 @@ from tolstat.cli._library import (
     design,
     points,
     pool,
+    recorded,
+    rewording,
     run,
+    stores,
     studies,
     table,
     tables,
@@ -31,6 +34,7 @@ from tolstat.cli._library import (
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.common.late import pandas as pd
+from tolstat.common.wording import AS_WRITTEN, Wording
 from tolstat.display.options import Opt
 from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
@@ -44,6 +48,49 @@ LOG = logging.getLogger("tolstat")
 LOG.propagate = False
 say, warn, fail = LOG.info, LOG.warning, LOG.error
 """Tell a message; a warning; why the command ends early. The last two are told with --quiet, too."""
+
+
+class _Told(logging.Filter):
+    """Tells messages with the word for the rows of what a command is about, see `about`."""
+
+    wording = AS_WRITTEN
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        record.msg, record.args = self.wording(record.getMessage()), ()
+        return True
+
+
+_TOLD = _Told()
+LOG.addFilter(_TOLD)
+
+
+def about(wording: Wording) -> None:
+    """Tell everything in this session with a wording."""
+    _TOLD.wording = wording
+
+
+def loaded(path: Path, **choices: Any) -> studies.Study:
+    """Load the study that a command is about."""
+    study = studies.load(path, **choices)
+    about(study.wording)
+    return study
+
+
+def opened(path: Path) -> stores.ResultFile:
+    """Open the result file that a command is about."""
+    store = stores.ResultFile.open(path)
+    about(recorded.wording_of(store))
+    return store
+
+
+def told(text: str) -> str:
+    """Text with the word for the rows of what the command is about."""
+    return _TOLD.wording(text)
+
+
+def answered(answer: answers.Answer) -> answers.Answer:
+    """Answer with the word for the rows of what the command is about."""
+    return rewording.answer(answer, _TOLD.wording)
 
 
 class _Stderr(logging.Handler):
@@ -108,6 +155,7 @@ def session(
     """
     terminal = _Stderr()
     LOG.handlers = [terminal]
+    about(AS_WRITTEN)
     LOG.setLevel(logging.DEBUG)
     terminal.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
     try:

@@ -15,13 +15,17 @@ import typer
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
 from tolstat.cli._shared import (
+    answered,
     deliver,
     echo,
     json_of,
+    loaded,
+    opened,
     print_json,
     print_table,
     progress,
     say,
+    told,
     wrapped,
     write,
     write_frame,
@@ -58,7 +62,7 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
     check : bool
         Compare all that is in the file with its checksums; exit code 2 if damaged.
     """
-    with progress("reading the file"), library.stores.ResultFile.open(file) as store:
+    with progress("reading the file"), opened(file) as store:
         states = {at.point or "": at.status() for at in store.each()}
         facts, view = _facts(store, states), store.view()
         # joints of a subset simulation are no sample
@@ -72,8 +76,8 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         shares = [row for table in tables[:1] for row in table.rows]
         print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
-    echo("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))]))
-    for table in tables[:1]:
+    echo(told("\n".join([*_lines(facts), *map(wrapped, library.remedy.in_words(reasons))])))
+    for table in answered(library.answers.Answer("status", "", tables[:1])).tables.values():
         echo()
         print_table(table.columns, table.for_people, wide)
 
@@ -192,7 +196,7 @@ def verify(
     ]
     facts = {"rows": verification.rows, "seed": verification.seed}
     facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
-    deliver(library.answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
+    deliver(answered(library.answers.Answer("verify", "Numerical error", parts, facts)), wide, as_json)
     if out is not None:
         write_frame(pd.DataFrame(library.accuracy.joint_rows(verification, mechanism)), out)
 
@@ -200,9 +204,9 @@ def verify(
 def _sampled(what: Path) -> tuple[Mechanism, str]:
     """What the joints of a study or result file are, and by which method they are sampled."""
     if what.suffix.lower() == ".toml":
-        study = library.studies.load(what)
+        study = loaded(what)
         return study.mechanism, study.sampling.method
-    with library.stores.ResultFile.open(what) as store:
+    with opened(what) as store:
         return store.mechanism, str(store.sampling["method"])
 
 
@@ -257,8 +261,8 @@ def export(
     for message, applies in wrong.items():
         if applies:
             raise typer.BadParameter(message)
-    with progress("export"), library.stores.ResultFile.open(file) as opened:
-        view = opened.view().at(point or "")
+    with progress("export"), opened(file) as whole:
+        view = whole.view().at(point or "")
         store = view.store
         if cycles is not None:
             table = library.fatigue.pylife_frame(view, nominal=nominal)
@@ -319,7 +323,8 @@ def report(
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accepted, again, point or "", full, brief)
         return
-    with library.stores.viewed(file) as view:
+    with opened(file) as store:
+        view = store.view()
         stem = (out or file.parent) / (f"{file.stem}_{point}" if point else file.stem)
         check_target(stem)
         with progress("report"):
@@ -331,7 +336,8 @@ def report(
 
 def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:
     check_target(out, file)
-    with library.stores.viewed(file) as view:
+    with opened(file) as store:
+        view = store.view()
         has_histories = bool(library.revolutions.held(view.store))
         if again is None:
             with progress("reading the file"):

@@ -10,7 +10,19 @@ from shlex import quote
 from typing import Annotated, Any, Literal
 
 from tolstat.cli import _library as library
-from tolstat.cli._shared import deliver, echo, print_json, print_study_notes, progress, say, work, wrapped
+from tolstat.cli._shared import (
+    about,
+    deliver,
+    echo,
+    loaded,
+    print_json,
+    print_study_notes,
+    progress,
+    say,
+    told,
+    work,
+    wrapped,
+)
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
@@ -38,16 +50,16 @@ def plan(
     pilot : int, optional
         Number of joints simulated for the prediction; default: 128, fewer if they take more than 20 s.
     """
-    loaded = library.studies.load(study_file, n=n)
-    print_study_notes(study_file, loaded)
-    if note := library.points.note_on_pins(loaded.tolerances, loaded.mechanism):
+    study = loaded(study_file, n=n)
+    print_study_notes(study_file, study)
+    if note := library.points.note_on_pins(study.tolerances, study.mechanism):
         say(f"note: {note}")
     with progress() as shown:
-        prediction = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)
+        prediction = library.plan.plan(study, workers, pilot or library.plan.PILOT, shown.stage)
     if as_json:
         print_json(asdict(prediction) | {"seconds": prediction.seconds})
     else:
-        echo(wrapped("\n".join(_lines(prediction))))
+        echo(wrapped(told("\n".join(_lines(prediction)))))
         meanings = {library.joints.ENTRIES: prediction.tolerances, library.joints.CORRELATED: prediction.correlations}
         for columns, rows in meanings.items():
             if rows:
@@ -123,7 +135,7 @@ def run(
         check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         text = library.rewriting.with_settings(library.strict.read_text(study_file), changes) if changes else None
-        plan = library.studies.load(study_file, n=n, text=text)
+        plan = loaded(study_file, n=n, text=text)
         again = None if retry is None else library.remedy.parse_retry(retry, retried, plan)
     raise_all(faults)
     print_study_notes(study_file, plan)
@@ -160,6 +172,7 @@ def extend(
     """
     with progress("drawing the errors"):
         plan = library.extend.extend(file, n, study_file)
+    about(plan.wording)
     say(f"{file}: extended to {n} joints")
     simulate(plan, file, workers=workers)
     conclude(file, report, wide)

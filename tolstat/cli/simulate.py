@@ -11,9 +11,25 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import deliver, echo, print_json, print_warnings, progress, say, warn, work, write, write_frame
+from tolstat.cli._shared import (
+    about,
+    answered,
+    deliver,
+    echo,
+    opened,
+    print_json,
+    print_warnings,
+    progress,
+    say,
+    told,
+    warn,
+    work,
+    write,
+    write_frame,
+)
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
+from tolstat.common.wording import Wording
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
 FORMATS = (".svg", ".png", ".pdf")
@@ -45,6 +61,7 @@ def simulate(
         that of CASE.
     """
     loaded = library.studies.load_case(case)
+    about(loaded.wording)
     if table is not None:
         measured, notes = library.crosses.of_one(table, loaded.mechanism, loaded.errors)
         loaded = replace(loaded, errors=loaded.errors | measured)
@@ -54,7 +71,7 @@ def simulate(
     say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
-    joints = library.parts.of_case(loaded, result)
+    joints = answered(library.parts.of_case(loaded, result))
     _deliver(result, joints.values() if as_json and joints.parts else {}, out, as_json)
     if joints.parts and not as_json:
         echo()
@@ -84,7 +101,7 @@ def replay(
     point : str, optional
         Operating point, such as cruise; needed if FILE has several.
     """
-    with progress("simulation"), library.stores.ResultFile.open(file) as store:
+    with progress("simulation"), opened(file) as store:
         again = library.replays.replay(store.at(point) if point else store, row)
     facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     _deliver(again.result, facts, out, as_json)
@@ -100,7 +117,7 @@ def _deliver(result: library.replays.CaseResult, facts: dict[str, Any], out: Pat
         print_json(summary)
     else:
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
+        echo(told("\n".join([*lines, library.text.align(_largest(summary["max"]))])))
     state = library.tables.Status[str(summary["status"]).upper()]
     if state != library.tables.Status.OK:
         warn(f"warning: {state.label}: {library.tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
@@ -181,6 +198,7 @@ def evaluate(
     needed = [name for name in names if uniform or name == library.function.VARIANT]
     varied = [name for name in names if name not in needed]
     joints = library.crosses.read(errors, whole.mechanism, units, None if uniform else whole.errors, needed)
+    about(Wording.of(whole.mechanism, whole.text, joints.labels))
     for note in joints.notes:
         say(note)
     own = dict.fromkeys(library.tables.FACTORS, 1.0) | whole.errors
@@ -210,7 +228,7 @@ def evaluate(
     if out != "-":
         values = dict(zip(f.loads, y.T, strict=True))
         found = library.parts.parts(f.study, values, f.turning, joints.labels, f.status)
-        deliver(library.answers.Answer("evaluate", "Joints", found), wide=False)
+        deliver(answered(library.answers.Answer("evaluate", "Joints", found)), wide=False)
 
 
 def show(

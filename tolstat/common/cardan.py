@@ -105,7 +105,12 @@ SPLINED = drive_shaft("splined shaft", "tube1", "tube2")
 """Drive shaft of two joints and two tubes, which slide in one another by a spline."""
 PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
-its first and its last shaft; unbalance of the last one, displacement of it across its axis, a spline that sticks."""
+its first and its last shaft; unbalance of the tubes and of the last shaft, displacement of that across its axis, a
+spline that sticks."""
+
+
+BALANCED = ("tube", "tube1", "tube2", "output")
+"""Bodies that may have an unbalance."""
 
 
 def named(base: Mechanism, parts: Collection[str]) -> str:
@@ -124,7 +129,7 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         unknowns=(*base.unknowns, *across),
         faces=tuple(Face(pin.replace("pin", "thrust"), pin) for pin in pins),
         friction="friction" in parts,
-        unbalance="unbalance" in parts,
+        unbalanced=tuple(body for body in base.bodies if body in BALANCED) if "unbalance" in parts else (),
         spline=base.spline or "spline" in parts,
     )
 

@@ -27,6 +27,8 @@ class Counts(NamedTuple):
         Those of the unsettled joints whose largest loads still change with finer steps.
     points : int
         Operating points; a joint counts once at each.
+    noun : str
+        What joints are called.
     """
 
     total: int
@@ -35,6 +37,7 @@ class Counts(NamedTuple):
     failed: int = 0
     not_resolved: int = 0
     points: int = 1
+    noun: str = "joints"
 
     @classmethod
     def of(cls, status: NDArray[np.uint8]) -> Counts:
@@ -44,7 +47,7 @@ class Counts(NamedTuple):
     @property
     def counted(self) -> str:
         """``"joints"``, or ``"simulations of joints at 2 operating points"``."""
-        return "joints" if self.points == 1 else f"simulations of joints at {self.points} operating points"
+        return self.noun if self.points == 1 else f"simulations of {self.noun} at {self.points} operating points"
 
     @property
     def shortfall(self) -> str:
@@ -65,6 +68,7 @@ class Counts(NamedTuple):
             self.failed + count(*FAILED),
             self.not_resolved + count(Status.NOT_RESOLVED),
             self.points,
+            self.noun,
         )
 
 

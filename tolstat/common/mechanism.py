@@ -184,8 +184,8 @@ class Mechanism(NamedTuple):
         What holds pins along their axes; without any, pins slide freely.
     friction : bool
         Whether pins rub in their holes.
-    unbalance : bool
-        Whether the last shaft has an unbalance.
+    unbalanced : tuple of str
+        Bodies that have an unbalance.
     spline : bool
         Whether the last shaft has a spline that sticks, or one joins two tubes.
     waves : int
@@ -205,7 +205,7 @@ class Mechanism(NamedTuple):
     cardan: tuple[str, ...] = ()
     faces: tuple[Face, ...] = ()
     friction: bool = False
-    unbalance: bool = False
+    unbalanced: tuple[str, ...] = ()
     spline: bool = False
     waves: int = 0
     loaded: str = ""
@@ -318,7 +318,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "face_pair": [[pair.pin for pair in mechanism.pairs].index(face.pin) for face in mechanism.faces],
         "face_end": [face.end for face in mechanism.faces],
         "friction": mechanism.friction,
-        "unbalanced": mechanism.unbalance,
+        "unbalanced": [body[name] for name in mechanism.unbalanced],
         "loaded": [body[name] for name in [mechanism.loaded] if name],
         "borne": [i for i, shaft in enumerate(mechanism.shafts) if shaft.borne],
         "first_filled": lumps + len(edges),

@@ -125,7 +125,12 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "bearings of shafts: of the nearer and of the farther one, place along z of the shaft",
             shape=(sum(shaft.borne for shaft in mechanism.shafts), 2),
         ),
-        Field("unbalance", "kg*m", "unbalance of the last shaft, along x and y of its frame", shape=(2,)),
+        Field(
+            "unbalance",
+            "kg*m",
+            "unbalance of a body along x and y of its frame",
+            shape=(len(mechanism.unbalanced), 2),
+        ),
         Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)

@@ -113,7 +113,7 @@ STATUS_TEXT = {
     "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "
     "interval (lower, upper); of a sub-harmonic joint those of its whole period",
     Status.CRASHED: "its process died with it twice; results are NaN",
-    Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
+    Status.INVALID_INPUT: "a parameter is not a finite number, or shaft.spline not from -1 to 1; results are NaN",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), an axis tilted by more than 0.1 rad (5.7 deg), an "
@@ -232,12 +232,14 @@ def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     of_parts = (
         (mechanism.is_shaft, "shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
         (mechanism.is_shaft, "shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
-        (mechanism.unbalance, "shaft.unbalance", "kg*m", "deviation of the output shaft's unbalance"),
-        (mechanism.unbalance, "shaft.unbalance_angle", "rad", "deviation of its direction"),
         (mechanism.spline, "shaft.spline", "1", "axial force of the sticking spline over 2 mu T/d, from -1 to 1"),
         (mechanism.friction, "friction.mu", "1", "deviation of the coefficient of friction"),
     )
     fields += [Field(name, unit, text) for there, name, unit, text in of_parts if there]
+    for body in mechanism.unbalanced:
+        owner = "output shaft" if body == "output" else body
+        fields.append(Field(f"{body}.unbalance", "kg*m", f"deviation of the {owner}'s unbalance"))
+        fields.append(Field(f"{body}.unbalance_angle", "rad", "deviation of its direction"))
     for prefix in prefixes(mechanism) if mechanism.faces else ():
         fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
     return tuple(fields)

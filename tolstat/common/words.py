@@ -10,7 +10,9 @@ _MEANT = {
     "friction, mu, friction coefficient, coefficient of friction, cof": "this is friction.mu under [joint]",
     "c0, c0r, static load rating": "the static load rating is used nowhere: leave it out; C is the dynamic one",
     "cr, dynamic load rating, load rating": "this is bearing.C under [joint]",
-    "unbalance, imbalance, balance, balance grade": "this is shaft.unbalance under [joint]",
+    "unbalance, imbalance, balance, balance grade": (
+        "this is shaft.unbalance under [joint], of tubes tube.unbalance in [shaft]"
+    ),
     "spline, slip joint, length compensation": (
         'write shaft.axial = "free" under [joint], and where it sticks shaft.spline = { mu = 0.1, diameter = "40 mm" }'
     ),

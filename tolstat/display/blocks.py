@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
+from tolstat.common.wording import AS_WRITTEN, Wording
 from tolstat.display.table import Table
 from tolstat.display.verdict import Verdict
 
@@ -128,10 +129,13 @@ class Reader:
         As `questions.exceedance.rows.readings` returns them.
     start : str
         The load shown first; empty for the first of `curves`.
+    wording : Wording
+        Tells its own words.
     """
 
     curves: Mapping[str, Any]
     start: str = ""
+    wording: Wording = AS_WRITTEN
 
 
 @dataclass(frozen=True)
@@ -181,6 +185,8 @@ class Page:
         What they were made from, always printed.
     full : bool
         Whether folded sections are open.
+    wording : Wording
+        Tells the words of the page itself.
     """
 
     title: str
@@ -190,3 +196,4 @@ class Page:
     provenance: str = ""
     listings: Sequence[Facts | Listing] = ()
     full: bool = False
+    wording: Wording = AS_WRITTEN

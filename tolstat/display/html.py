@@ -103,7 +103,7 @@ def write(page: Page, path: Path, processes: int = 1) -> None:
         Number of processes that draw pictures.
     """
     drawn = figures([block for section in page.sections for block in section.blocks], processes)
-    script = (TEMPLATES / "page.js").read_text(encoding="utf-8")
+    script = page.wording((TEMPLATES / "page.js").read_text(encoding="utf-8"))
     template = environment(drawn).get_template("page.html.j2")
     text = template.render(
         page=page, version=tolstat.__version__, script=Markup(script), policy=POLICY.format(allowed(script))

@@ -49,11 +49,11 @@ def text(counts: Counts, begun: int, seconds: float, budget: float = math.inf) -
         ``"128 of 513 joints, 2.9 joints/s, 2:12 left, 1 failed, 0 not settled"``; without rate and remaining time
         before the first joint is done.
     """
-    words = [f"{counts.done} of {counts.total} joints"]
+    words = [f"{counts.done} of {counts.total} {counts.noun}"]
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
         remaining = min((counts.total - counts.done) / rate, max(budget, 0.0))
-        words += [f"{rate:.3g} joints/s", f"{clock(remaining)} left"]
+        words += [f"{rate:.3g} {counts.noun}/s", f"{clock(remaining)} left"]
     return ", ".join([*words, counts.shortfall])
 
 

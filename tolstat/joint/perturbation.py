@@ -23,7 +23,7 @@ from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Unbalance
 from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
 from tolstat.joint.spline import Spline
 
@@ -98,7 +98,16 @@ def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
     """What is simulated: a joint or a drive shaft, with the parts that the joint has."""
     shaft = _shaft_of(operation)
     base = CARDAN if shaft is None else shaft.mechanism
-    return MECHANISMS[named(base, joint.parts)]
+    return MECHANISMS[named(base, joint.parts if shaft is None else (*joint.parts, *shaft.parts))]
+
+
+def unbalances(joint: Joint, operation: Operation) -> dict[str, tuple[Unbalance | None, float | None]]:
+    """Unbalance of each body that may have one, and the mass of the body (kg)."""
+    shaft = _shaft_of(operation)
+    tubes = {} if shaft is None else shaft.tubes
+    return {name: (tube.unbalance, tube.mass) for name, tube in tubes.items()} | {
+        "output": (joint.shaft.unbalance, joint.shaft.mass)
+    }
 
 
 def _shaft_of(operation: Operation) -> DriveShaft | None:
@@ -131,8 +140,14 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     """
     values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
     if spline is not None:
-        values["axial_force"] = values["axial_force"] + errors[SPLINE] * spline.largest_force(values["torque"])
+        values["axial_force"] = values["axial_force"] + _sticking(errors, spline, values["torque"])
     return values
+
+
+def _sticking(errors: Table, spline: Spline, torque: Array) -> Array:
+    """Force of a spline that sticks, N, (n,); NaN where it is above the largest one."""
+    share = errors[SPLINE]
+    return np.where(abs(share) <= 1.0, share, np.nan) * spline.largest_force(torque)
 
 
 def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
@@ -196,11 +211,13 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
             play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
             params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if shaft is not None and shaft.spline is not None:
-        params["push"] = errors[SPLINE] * shaft.spline.largest_force(point["torque"])
-    if joint.shaft.unbalance is not None:
-        size = joint.shaft.unbalance.size + errors["shaft.unbalance"]
-        angle = (joint.shaft.unbalance.angle or 0.0) + errors["shaft.unbalance_angle"]
-        params["unbalance"] = (size * np.array([np.cos(angle), np.sin(angle)])).T
+        params["push"] = _sticking(errors, shaft.spline, point["torque"])
+    of_bodies = unbalances(joint, operation)
+    for i, body in enumerate(mechanism.unbalanced):
+        unbalance, mass = of_bodies[body]
+        size = (unbalance.size(mass) if unbalance else 0.0) + errors[f"{body}.unbalance"]
+        angle = (unbalance.angle or 0.0 if unbalance else 0.0) + errors[f"{body}.unbalance_angle"]
+        params["unbalance"][:, i] = (size * np.array([np.cos(angle), np.sin(angle)])).T
     if joint.friction.mu is not None:
         params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params

@@ -213,7 +213,7 @@ class Friction(Strict):
 
 
 class Unbalance(Strict):
-    """Unbalance of the output shaft, in the plane of the joint's centre: an amount, or a grade, mass and speed."""
+    """Unbalance of the output shaft in the plane of the joint's centre, or of a tube at its mass centre."""
 
     amount: units.Unbalance | None = Field(default=None, examples=["1e-3 kg*m"])
     """unbalance: mass times distance of its centre from the axis"""
@@ -222,32 +222,31 @@ class Unbalance(Strict):
     )
     """balance quality grade G of ISO 21940-11: distance times angular velocity; its number is in mm/s, up to 4000"""
     mass: units.Mass | None = Field(default=None, examples=["5 kg"])
-    """mass that the grade is for"""
+    """mass that the grade is for; when left out: that of shaft or tube"""
     speed: Annotated[units.Speed, POSITIVE] | None = Field(default=None, examples=["3000 rpm"])
     """highest speed, which the grade is for"""
     angle: units.Angle | None = Field(default=None, examples=["30 deg"])
-    """direction, from x of the output shaft towards y; the error `shaft.unbalance_angle` is a deviation from it"""
+    """direction, from x of the body's frame towards y; errors `output.unbalance_angle`, `tube.unbalance_angle` are
+    deviations from it"""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Unbalance:
-        of_grade = ("grade", "mass", "speed")
-        given = " and ".join(key for key in of_grade if getattr(self, key) is not None)
-        lacking = " and ".join(key for key in of_grade if getattr(self, key) is None)
+        given = " and ".join(key for key in ("grade", "mass", "speed") if getattr(self, key) is not None)
+        lacking = " and ".join(key for key in ("grade", "speed") if getattr(self, key) is None)
         if self.amount is not None and given:
             raise refuse(f"has amount beside {given}", f"remove amount, or {given}")
         if self.amount is None and not given:
-            remedy = 'give amount = "1e-3 kg*m", or grade = "16 mm/s", mass = "5 kg" and speed = "3000 rpm", of yours'
-            raise refuse("has neither amount nor grade, mass and speed", remedy)
+            remedy = 'give amount = "1e-3 kg*m", or grade = "16 mm/s" and speed = "3000 rpm", of yours'
+            raise refuse("has neither amount nor grade and speed", remedy)
         if self.amount is None and lacking:
             raise refuse(f"has {given} without {lacking}", f"add {lacking}, or give amount instead")
         return self
 
-    @property
-    def size(self) -> float:
-        """Unbalance, kg m."""
-        if self.grade is None or self.mass is None or self.speed is None:
+    def size(self, mass: float | None) -> float:
+        """Unbalance, kg m, of a body of this mass (kg)."""
+        if self.grade is None or self.speed is None:
             return self.amount or 0.0
-        return self.grade * self.mass / self.speed
+        return self.grade * (self.mass or mass or 0.0) / self.speed
 
 
 class Shaft(Strict):
@@ -281,6 +280,13 @@ class Shaft(Strict):
     spline: Spline | None = None
     """Spline that sticks with a force of the error `shaft.spline`, from -1 to 1, times 2 mu T/d. In a study with
     tolerances this error is uniform unless they say otherwise"""
+
+    @field_validator("unbalance")
+    @classmethod
+    def _mass_of_grade(cls, value: Unbalance | None, info: ValidationInfo) -> Unbalance | None:
+        if value is not None and value.grade and value.mass is None and info.data.get("mass", 0.0) is None:
+            raise refuse("has grade without mass", 'add mass = "5 kg" with your value, or give amount instead')
+        return value
 
     @field_validator("lateral")
     @classmethod

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import units
-from tolstat.common.cardan import SHAFT, SPLINED
+from tolstat.common.cardan import CARDAN, MECHANISMS, SHAFT, SPLINED, named
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
-from tolstat.joint.sections import Length, Stiffness
+from tolstat.joint.sections import Length, Stiffness, Unbalance
 from tolstat.joint.spline import Spline
 
 PLANES = {"Z": math.pi, "W": 0.0}
@@ -48,6 +48,9 @@ class Tube(Strict):
     """distance of its mass centre from the joint that it carries, of a single tube from joint 1; when left out: half of
     its length"""
 
+    unbalance: Unbalance | None = None
+    """Unbalance of the tube"""
+
     @model_validator(mode="after")
     def _one_of_two(self) -> Tube:
         ways = ("diameter", "wall"), ("mass", "inertia", "inertia_across")
@@ -63,6 +66,12 @@ class Tube(Strict):
         if self.wall is not None and self.diameter is not None and self.wall > 0.5 * self.diameter:
             raise refuse("its wall is thicker than half of its diameter", "check wall and diameter")
         return self
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Tube:
+        """Tube from its values in SI units."""
+        made = {"unbalance": Unbalance.model_construct(**values["unbalance"])} if values.get("unbalance") else {}
+        return cls.model_construct(**{**values, **made})
 
     def body(self, length: float) -> tuple[float, Array]:
         """Mass (kg) and moments of inertia about x, y, z (kg m^2) of a tube of a length (m)."""
@@ -91,12 +100,21 @@ class SplineOfTubes(Spline):
     """damping of the motion along it"""
 
 
+def by_keys(shaft: object, parts: Collection[str]) -> Mechanism:
+    """What is simulated with a `[shaft]` as a study writes it, None without, with some of `cardan.PARTS`."""
+    keys = shaft if isinstance(shaft, Mapping) else {}
+    base = CARDAN if shaft is None else SPLINED if "spline" in keys else SHAFT
+    unbalanced = any("unbalance" in tube for tube in keys.values() if isinstance(tube, Mapping))
+    return MECHANISMS[named(base, (*parts, "unbalance") if unbalanced else parts)]
+
+
 class Lumped(NamedTuple):
     """A tube as a lump: its mass centre's distance from joint 1 (m), mass (kg), moments of inertia (kg m^2)."""
 
     at: float
     mass: float
     inertia: Array
+    unbalance: Unbalance | None
 
 
 class DriveShaft(Strict):
@@ -135,8 +153,9 @@ class DriveShaft(Strict):
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> DriveShaft:
         """Drive shaft from its values in SI units, as result files hold them."""
-        parts: dict[str, type[Strict]] = {"tube": Tube, "tube2": Tube, "spline": SplineOfTubes}
-        made = {key: part.model_construct(**values[key]) for key, part in parts.items() if values.get(key)}
+        made: dict[str, Strict] = {key: Tube.of(values[key]) for key in ("tube", "tube2") if values.get(key)}
+        if values.get("spline"):
+            made["spline"] = SplineOfTubes.model_construct(**values["spline"])
         return cls.model_construct(**{**values, **made})
 
     @property
@@ -152,6 +171,11 @@ class DriveShaft(Strict):
         return SHAFT if self.spline is None else SPLINED
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """Those of `cardan.PARTS` that its tubes give it."""
+        return ("unbalance",) if any(tube.unbalance for tube in self.tubes.values()) else ()
+
+    @property
     def plane(self) -> float:
         """Angle of the plane of joint 2 ahead of that of joint 1, about the tube, rad."""
         return PLANES[self.arrangement] if isinstance(self.arrangement, str) else self.arrangement
@@ -161,12 +185,12 @@ class DriveShaft(Strict):
         """The tubes by name of their lump."""
         if self.spline is None:
             at = 0.5 * self.length if self.tube.centre is None else self.tube.centre
-            return {"tube": Lumped(at, *self.tube.body(self.length))}
+            return {"tube": Lumped(at, *self.tube.body(self.length), self.tube.unbalance)}
         first, second = self.tube, self.tube2 or self.tube
         lengths = self.spline.at, self.length - self.spline.at
         before = 0.5 * lengths[0] if first.centre is None else first.centre
         behind = 0.5 * lengths[1] if second.centre is None else second.centre
         return {
-            "tube1": Lumped(before, *first.body(lengths[0])),
-            "tube2": Lumped(self.length - behind, *second.body(lengths[1])),
+            "tube1": Lumped(before, *first.body(lengths[0]), first.unbalance),
+            "tube2": Lumped(self.length - behind, *second.body(lengths[1]), second.unbalance),
         }

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache, wraps
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -56,10 +58,10 @@ class Question(NamedTuple):
     def functions(self) -> tuple[Callable[..., Answer], Callable[..., list[Path]] | None]:
         """The function that answers the question, and the one that simulates for it, if any."""
         module = self._module()
-        return getattr(module, self.name), getattr(module, "simulate", None)
+        return told(getattr(module, self.name)), getattr(module, "simulate", None)
 
     def on_page(self, view: View, asked: Asked) -> Answer:
-        """Answer that the page shows.
+        """Answer that the page shows, which words it as a whole.
 
         Raises
         ------
@@ -73,6 +75,21 @@ class Question(NamedTuple):
 
     def _module(self) -> Any:
         return import_module(f"tolstat.questions.{self.file or self.name}")
+
+
+@cache
+def told(answer_of: Callable[..., Answer]) -> Callable[..., Answer]:
+    """Let a function of views answer in the words of the first of them, see `common.wording`."""
+
+    @wraps(answer_of)
+    def answer(*views: View, **options: Any) -> Answer:
+        from tolstat.display import rewording
+        from tolstat.store.recorded import wording_of
+
+        first = views[0] if views else options[next(iter(signature(answer_of).parameters))]
+        return rewording.answer(answer_of(*views, **options), wording_of(first.store))
+
+    return answer
 
 
 QUESTIONS = (

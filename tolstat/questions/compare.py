@@ -278,8 +278,8 @@ def _notes(
     a, b = map(len, both.samples)
     if both.paired:
         yield f"{a} pairs of joints with the same random numbers"
-        pairs = len({row["row"] for row in switched})
-        yield f"{pairs} pairs have only one joint above a limit; {len(switched)} such cases, limit by limit"
+        pairs, cases = len({row["row"] for row in switched}), f"{len(switched)} such cases, limit by limit"
+        yield f"{pairs} pairs have a limit that only one of their joints exceeds; {cases}"
         yield from _tests(shares)
     else:
         yield f"{a} and {b} joints with different random numbers"

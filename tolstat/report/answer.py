@@ -13,7 +13,7 @@ from tolstat.campaign.stop_rule import BIASED
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import check_target
 from tolstat.common.tables import Status
-from tolstat.display import text
+from tolstat.display import rewording, text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, capability, shares
@@ -43,6 +43,10 @@ def report(view: View, accepted: float = math.nan) -> Answer:
         where the study sets limits, ``quantiles`` and, with at most `rows.MAX_LEVELS` levels of a load, ``exceedance``;
         for a sweep the table ``sweep``, for listed joints ``cases``. Loads that the study does not keep are left out.
     """
+    return rewording.answer(_answer(view, accepted), recorded.wording_of(view.store))
+
+
+def _answer(view: View, accepted: float) -> Answer:
     store = view.store
     stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
     if store.case_names or view.method == "sweep":
@@ -188,7 +192,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         remedy = "its joints are in: tolstat export --csv"
         raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
     verdict = headline(view, accepted)
-    head = {
+    head: dict[str, Any] = {
         "study": view.name,
         "method": view.method,
         "confidence": 0.95,
@@ -205,8 +209,9 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "stop": store.stop,
     }
     answers = questions.statistics(view)
-    stands_on = {
+    stands_on: dict[str, Any] = {
         "joint": mounting_and_law(*recorded.mountings(store)),
         "fidelity": fidelity.sentence(store.options, store.fidelity),
     }
+    head, stands_on = (rewording.values(each, recorded.wording_of(store)) for each in (head, stands_on))
     return head | answers | stands_on | {"provenance": provenance}

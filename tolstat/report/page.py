@@ -15,7 +15,7 @@ from tolstat.common import loads, notation, strict, units
 from tolstat.common.columns import METHODS
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
-from tolstat.display import html, progress, table, text
+from tolstat.display import html, progress, rewording, table, text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Block, Decision, Facts, Listing, Page, Panels, Section, Sentence
 from tolstat.display.verdict import WORDS, Verdict
@@ -123,7 +123,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
         sections = sorted(sections_of(view, asked), key=lambda section: section.folded)
         listings = [Facts(tuple(_facts(store)), "Provenance"), joint_values(store)]
         listings.append(Listing("The study as it was run", store.study_text))
-    return Page(
+    composed = Page(
         view.name,
         recorded.joint_of(store, 0).description,
         scene(view),
@@ -134,6 +134,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
         listings,
         full,
     )
+    return rewording.page(composed, recorded.wording_of(store))
 
 
 def sections_of(view: View, asked: Asked) -> Iterator[Section]:

@@ -22,6 +22,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, SUBSET, Column, drawn_columns
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import DESIGN, Status, tables
+from tolstat.common.wording import row_of
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import GROUP, ROWS, CheckedFile, Integrity
@@ -200,7 +201,7 @@ class Reader:
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
-        counts = Counts(self.n * len(each), points=len(each))
+        counts = Counts(self.n * len(each), points=len(each), noun=f"{row_of(self.mechanism)}s")
         for at_point in each:
             counts = counts.after(at_point.status())
         return counts

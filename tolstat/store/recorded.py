@@ -14,6 +14,7 @@ from tolstat.analysis.design import Design, Independent, Listed, Replicated
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
+from tolstat.common.wording import Wording
 from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
@@ -26,6 +27,11 @@ from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
 
 _OPERATION = tuple(f"operation.{name}" for name in MEANS)
+
+
+def wording_of(store: Reader) -> Wording:
+    """Wording of what is said of the rows of a file."""
+    return Wording.of(store.mechanism, store.study_text, (store.study_name, store.path.stem, *store.case_names))
 
 
 def joint_of(store: Reader, row: int) -> Joint:

@@ -16,6 +16,7 @@ from tolstat.common.errors import input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.loads import loads_of
 from tolstat.common.tables import Status
+from tolstat.common.wording import row_of
 from tolstat.store import recorded
 from tolstat.store.layout import MEANINGS
 from tolstat.store.reader import Reader
@@ -44,7 +45,7 @@ class ResultFile(Reader):
     def __repr__(self) -> str:
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"
-        joints = f"{self.n - self.first_sample} joints"
+        joints = f"{self.n - self.first_sample} {row_of(self.mechanism)}s"
         progress = []
         for store in self.each():
             codes, numbers = np.unique(store.status(slice(self.first_sample, None)), return_counts=True)

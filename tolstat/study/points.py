@@ -22,6 +22,7 @@ from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
+from tolstat.joint.perturbation import unbalances
 from tolstat.joint.sections import FREE, RIGID
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
@@ -232,7 +233,6 @@ def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
 
 
 FORCE = "operation.axial_force"
-_DIRECTION = "shaft.unbalance_angle"
 Varied = Mapping[str, Collection[str]]
 
 
@@ -291,7 +291,7 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     settings : sequence of Setting
         All joints of a study at all of their operating points.
     varied : mapping
-        Errors of operating point and shaft that scatter or are swept, to the sections of the study in which they do.
+        Errors that scatter or are swept, to the sections of the study in which they do.
 
     Yields
     ------
@@ -308,10 +308,12 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
         if len({part in setting.joint.parts for setting in settings}) > 1:
             found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
             yield ("joint",), found, "give it to all of them, or to none"
-    unbalances = [setting.joint.shaft.unbalance for setting in settings]
-    if not varied.get(_DIRECTION) and any(unbalance and unbalance.angle is None for unbalance in unbalances):
-        remedy = f'write "{_DIRECTION}" = {{ plus_minus = "180 deg", distribution = "uniform" }} under [tolerances]'
-        yield ("joint", "shaft", "unbalance"), "has no direction", f"{remedy}, or give its angle"
+    for body, (unbalance, _) in (found for s in settings for found in unbalances(s.joint, s.operation).items()):
+        if unbalance and unbalance.angle is None and not varied.get(f"{body}.unbalance_angle"):
+            uniform = '{ plus_minus = "180 deg", distribution = "uniform" }'
+            remedy = f'write "*.unbalance_angle" = {uniform} under [tolerances], or give its angle'
+            path = ("joint", "shaft") if body == "output" else ("shaft", "tube")
+            yield (*path, "unbalance"), "has no direction", remedy
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"
         yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'

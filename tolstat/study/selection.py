@@ -1,7 +1,6 @@
 """A file that is being read, and names of errors and results in it: ``"pin*.offset_t"`` selects an error of all pins.
 
-In TOML a name may be written as one quoted key or dotted: ``pin1.tilt_z = "0.5 deg"`` arrives as a table in
-a table.
+In TOML a name may be written as one quoted key or dotted: ``pin1.tilt_z = "0.5 deg"`` arrives as nested tables.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
-from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
+from tolstat.common.cardan import PARTS
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
@@ -23,6 +22,7 @@ from tolstat.common.tables import tables
 from tolstat.common.units import to_si
 from tolstat.joint.model import giving
 from tolstat.joint.reading import is_joint
+from tolstat.joint.shaft import by_keys
 from tolstat.study import signals
 from tolstat.study.axes import alike, columns_of, compatible, is_pair, is_zone, own, zone_of, zone_units
 
@@ -175,8 +175,9 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     if remedy := without_joint(pattern, names):
         return remedy
     if key := giving(pattern):
-        owner = "shafts with " if key == "shaft.spline" and "shaft.offset" in names else "joints with joint."
-        return f"only {owner}{key} have it: add that, or remove this entry"
+        of_tube, sticks = pattern.startswith("tube"), key == "shaft.spline" and "shaft.offset" in names
+        key = "shaft.tube.unbalance" if of_tube else key if sticks else f"joint.{key}"
+        return f"only {'shafts' if of_tube or sticks else 'joints'} with {key} have it: add that, or remove this entry"
     every = list(dict.fromkeys(halves(name)[0] for name in names))
     feature, key = (pattern, "") if pattern in every else halves(pattern)
     known = [name for name in every if _matches(feature, name)]
@@ -297,9 +298,8 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint, shaft = self.parts.get("joint"), self.data.get("shaft")
-        base = CARDAN if shaft is None else SPLINED if isinstance(shaft, dict) and "spline" in shaft else SHAFT
-        return MECHANISMS[named(base, joint.parts if joint else PARTS)]
+        joint = self.parts.get("joint")
+        return by_keys(self.data.get("shaft"), joint.parts if joint else PARTS)
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

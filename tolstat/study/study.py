@@ -20,6 +20,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.toml_lines import KeyPath
+from tolstat.common.wording import Wording, row_of
 from tolstat.joint import SPLINE, Joint, Operation, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
@@ -209,10 +210,10 @@ class Study:
 
     @property
     def _varied(self) -> dict[str, list[str]]:
-        """Errors of operating point and shaft that scatter or are swept, to the sections in which they do."""
+        """Errors that scatter or are swept, to the sections in which they do."""
         grid = {name for point in self.listed.points for name in point} if self.listed else set()
         names = {"tolerances": self.tolerances, "sweep": [n for axis in self.sweep for n in axis.names], "grid": grid}
-        varied = [name for section in names.values() for name in section if name.startswith(("operation.", "shaft."))]
+        varied = [name for section in names.values() for name in section]
         return {name: [section for section in names if name in names[section]] for name in varied}
 
     @property
@@ -296,8 +297,16 @@ class Study:
             return list(dict.fromkeys(split(name)[0] for name in self.limits))
         return [name for name, load in loads_of(self.mechanism).items() if holds(self.columns, load)]
 
+    @property
+    def wording(self) -> Wording:
+        """Wording of what is said of the rows."""
+        return Wording.of(self.mechanism, self.text, (self.name,))
+
     def __repr__(self) -> str:
-        parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
+        parts = [
+            f"{self.samples} {row_of(self.mechanism)}s ({self.sampling.method})",
+            f"{len(self.tolerances)} toleranced errors",
+        ]
         parts.append(f"{len(self.limits)} limit{'s' * (len(self.limits) != 1)}")
         if len(self.points) > 1:
             parts.append(f"{len(self.points)} operating points")
@@ -310,7 +319,7 @@ class Study:
             **{f"operation {point.name}".rstrip(): point.in_words for point in self.points},
             "solver": f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution",
             "fixed errors, SI": ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none",
-            "sampling": f"{sampling.method}, {self.samples} joints, seed {sampling.seed}",
+            "sampling": f"{sampling.method}, {self.samples} {row_of(self.mechanism)}s, seed {sampling.seed}",
             "toleranced": ", ".join(self.tolerances) or "none",
             "limits": limits_in_words(self.limits, self.mechanism),
         }

@@ -18,7 +18,7 @@ from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.cardan import CROSS, OUTPUT
-from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
+from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies, throw
 from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
@@ -91,6 +91,7 @@ def ideal_loads(phase, at_rest, par, work):
         carry(i, par, work)
     for face in range(par.face_pair.shape[0]):
         work.face[face, FORCE] = 0.0
+    throw(par, work)
 
 
 @njit

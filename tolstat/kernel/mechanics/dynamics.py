@@ -93,6 +93,7 @@ def forces(t, q, v, par, work):
     if par.friction == 1:
         for pin in range(work.contact.shape[0]):
             rub(pin, par, work)
+    throw(par, work)
 
 
 @njit
@@ -104,6 +105,16 @@ def weigh(par, work):
         f = scale(mass, turn_back(work.attitude, par.frame[body], g))
         for k in range(3):
             work.force[body, k] += f[k]
+
+
+@njit
+def throw(par, work):
+    """Add the forces of unbalances, which turn with the frames of their bodies."""
+    for i in range(par.unbalanced.shape[0]):
+        body = par.unbalanced[i]
+        speed = work.frame_w[par.frame[body], 2]
+        for k in range(2):
+            work.force[body, k] += par.unbalance[i, k] * speed * speed
 
 
 @njit
@@ -138,8 +149,7 @@ def axial_force(shaft, q, v, par, work):
 def lateral_force(body, par, work):
     """Force across a shaft that accelerates it, N, along x and y: of its arms, of its unbalance and of the bearings."""
     x, y = bearing_force(body, par, work)
-    u_x, u_y = unbalance_force(body, par, work)
-    return work.force[body, 0] + u_x - x, work.force[body, 1] + u_y - y
+    return work.force[body, 0] - x, work.force[body, 1] - y
 
 
 @njit
@@ -151,15 +161,6 @@ def bearing_force(body, par, work):
         par.k_l * x + par.c_l * (work.vel[body, 0] - turning * y),
         par.k_l * y + par.c_l * (work.vel[body, 1] + turning * x),
     )
-
-
-@njit
-def unbalance_force(body, par, work):
-    """Force of the unbalance of the last shaft, N, along x and y of its frame; 0 of others."""
-    speed = work.frame_w[par.frame[body], 2]
-    if par.unbalanced == 1 and body == work.force.shape[0] - 1:
-        return par.unbalance[0] * speed * speed, par.unbalance[1] * speed * speed
-    return 0.0 * speed, 0.0 * speed
 
 
 @njit

@@ -6,7 +6,7 @@ They follow from what `dynamics.forces` or `ideal_loads` has written to the work
 import math
 
 from tolstat.common.load_kinds import CONTACTS
-from tolstat.kernel.mechanics.dynamics import bearing_force, unbalance_force
+from tolstat.kernel.mechanics.dynamics import bearing_force
 from tolstat.kernel.mechanics.vector import row, turn
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.simd.jit import njit
@@ -22,10 +22,10 @@ OF_FORCES, OF_TORQUES = range(2)
 
 @njit
 def shaft_load(shaft, par, work):
-    """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
+    """Force (N) and moment about O (N m) of joint and unbalance on a shaft, in axes of its ideal frame.
 
     Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a; across one that is
-    not held across likewise. Across one that is held, its unbalance adds to the force.
+    not held across likewise.
 
     Parameters
     ----------
@@ -43,9 +43,6 @@ def shaft_load(shaft, par, work):
         m_x, m_y = m_x - s * y, m_y + s * x
     if par.across[shaft] >= 0:
         x, y = bearing_force(body, par, work)
-    elif par.unbalanced == 1:
-        u_x, u_y = unbalance_force(body, par, work)
-        x, y = x + u_x, y + u_y
     return (x, y, z), (m_x, m_y, m_z)
 
 

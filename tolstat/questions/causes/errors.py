@@ -237,7 +237,8 @@ def _notes(of_errors: Indices, command: str, shown: int) -> list[str]:
     alone = f"errors alone explain {additive:.0f} %{ends} of the variance"
     if number := len(rows) - len(seen := _seen(rows, shown)):
         rest = additive - 100 * sum(row["first"] for row in seen)
-        alone += f", of which the {number} not shown {rest:+.0f} % (without effect they scatter about 0 %)"
+        share = "0" if abs(rest) < 0.5 else f"{rest:+.0f}"
+        alone += f", of which the {number} not shown {share} % (without effect they scatter about 0 %)"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
     level = "at least one limit" if facts["load"] == ANY_LIMIT else f"{facts['level']:.5g} {unit}".rstrip()
     tail = f"; tail: {facts['above']} joints above {level}"

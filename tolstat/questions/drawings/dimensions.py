@@ -89,8 +89,8 @@ def _of_parts(joint: Joint) -> Iterator[Line]:
         if borne is not None:
             places = ", ".join(f"{1e3 * place:.5g}" for place in borne.bearings)
             yield f"shaft.{end}.bearings", f"{places} mm", f"bearings of the {end} shaft from the joint's centre"
-    if joint.shaft.unbalance is not None:
-        yield "shaft.unbalance", f"{1e6 * joint.shaft.unbalance.size:.5g} g*mm", "unbalance of the output shaft"
+    if unbalance := joint.shaft.unbalance:
+        yield "shaft.unbalance", _gmm(unbalance.size(joint.shaft.mass)), "unbalance of the output shaft"
 
 
 def _of_shaft(shaft: DriveShaft) -> Iterator[Line]:
@@ -107,6 +107,8 @@ def _of_shaft(shaft: DriveShaft) -> Iterator[Line]:
         size = "" if tube.diameter is None else f"{1e3 * tube.diameter:.5g} x {1e3 * (tube.wall or 0.0):.5g} mm, "
         what = "diameter, wall, mass" if size else "mass"
         yield f"shaft.{key}", f"{size}{lump.mass:.4g} kg", f"tube {carries}: {what}".replace(" :", ":")
+        if tube.unbalance:
+            yield f"shaft.{key}.unbalance", _gmm(tube.unbalance.size(lump.mass)), "its unbalance"
 
 
 def _of_spline(shafts: Sequence[OperationOfShaft], names: str) -> Iterator[Line]:
@@ -127,6 +129,10 @@ def _at(points: Sequence[Point]) -> str:
 
 def _mm(length: float) -> str:
     return f"{1e3 * length:.5g} mm"
+
+
+def _gmm(unbalance: float) -> str:
+    return f"{1e6 * unbalance:.5g} g*mm"
 
 
 def _deg(angle: float) -> str:

@@ -89,7 +89,7 @@ def _draw(
             view.plot(at[2], at[axis], label="spline", gid=f"{title}.spline", **SPLINE)
         if len(bearings):
             view.plot(*bearings[:, [2, axis]].T, label="bearing", gid=f"{title}.bearings", **BEARING)
-        view.plot(*ends[1:3, [2, axis]].T, label="joint", gid=f"{title}.joints", **JOINT)
+        view.plot(*ends[1:3, [2, axis]].T, label="Cardan joint", gid=f"{title}.joints", **JOINT)
         for number, (place, alpha) in enumerate(zip(ends[1:3], operation.alphas, strict=True), 1):
             view.annotate(f"joint {number}, {np.degrees(alpha):.4g}°", place[[2, axis]], (0.0, 14.0), **NAME)
     box = (0.2 / WIDTH, 0.05 / size[1], FORKS / WIDTH, FORKS / size[1])

@@ -11,6 +11,7 @@ import pytest
 
 from tests.questions.test_change import TEXT, made, share_of
 from tests.questions.test_change import quick as quick
+from tests.questions.test_lines import TWO, written
 from tests.support import synthetic
 from tests.support.two_errors import stand_in
 from tolstat import study
@@ -249,3 +250,13 @@ def test_steps_are_those_of_a_drawing() -> None:
 def test_preferred_numbers(value: float, finer: float, coarser: float) -> None:
     assert ladder.preferred(value, -1) == pytest.approx(finer)
     assert ladder.preferred(value, 1) == pytest.approx(coarser)
+
+
+@pytest.mark.usefixtures("quick")
+def test_one_operating_point_is_searched_and_simulated_alone(tmp_path: Path) -> None:
+    path = written(tmp_path, TWO)
+    question.simulate(path, Work(workers=1, point="cruise"), [TARGET])
+    with ResultFile.open(path) as store:
+        view = store.view()
+        assert {name.partition(" at ")[2] for one in view.altered.values() for name in one.names} == {"cruise"}
+        assert question.allocate(view.at("cruise"), [TARGET]).facts["verdict"].startswith("Holds")

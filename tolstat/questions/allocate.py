@@ -380,7 +380,7 @@ def simulate(
     """
     begin = time.monotonic()
     with Writer.open(path) as store, kept_workers():
-        view = View(store, work.study_file)
+        view = View(store, work.study_file).at(work.point)
         request = _read_request(view, targets, costs, keep or (), most)
         loads = [name for statement in request.statements for name in statement.limit.loads]
         simulation = shares.Simulation(store, view, work, loads)

@@ -18,7 +18,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, NotApplicable, StoreError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, Limit, split
+from tolstat.common.loads import ANY_LIMIT, FloatArray, Limit
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Document
@@ -29,7 +29,7 @@ from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.placing import joint_beside, placed
-from tolstat.study.points import at, names_of
+from tolstat.study.points import at
 from tolstat.study.rewriting import with_keys
 
 WIDEST = 0.5
@@ -317,7 +317,7 @@ class Simulation:
     work : Work
         Workers, progress and messages.
     loads : sequence of str
-        Loads whose operating points the joints are simulated at; empty for those without a point.
+        Loads whose operating points the joints are simulated at; empty for those without a point: all of the view.
 
     Attributes
     ----------
@@ -329,7 +329,7 @@ class Simulation:
 
     def __init__(self, store: Writer, view: View, work: Work, loads: Iterable[str]) -> None:
         every = tuple(view.store.points)
-        chosen = {point for name in loads for point in names_of(split(name)[1], every, name)}
+        chosen = {point for name in loads for point in view.narrowed(name)[0].points}
         self._asked = sets.Asked(view.kept_loads, [point for point in every if point in chosen])
         self._store, self._study, self._work = store, view.study, work
         self._workers = work.workers or available_cores()

@@ -75,6 +75,38 @@ def test_the_table_makes_a_study_of_two_joints() -> None:
     assert points.Point.of("", read.points[0].values()) == read.points[0]
 
 
+POINTS = """[[operation]]
+name = "low"
+alpha = "8 deg"
+speed = "1500 rpm"
+torque = "100 N*m"
+[[operation]]
+name = "high"
+alpha = "4 deg"
+alpha2 = "3 deg"
+speed = "1500 rpm"
+torque = "100 N*m"
+"""
+
+
+def with_points(text: str) -> str:
+    """Study with two operating points, of which the second has an angle of joint 2 of its own."""
+    begin, end = text.index("[operation]"), text.index("[shaft]") if "[shaft]" in text else text.index("[tolerances]")
+    return text[:begin] + POINTS + text[end:]
+
+
+def test_joint_2_may_have_an_angle_at_each_operating_point() -> None:
+    read = load(with_points(WHOLE))
+    np.testing.assert_allclose([at.operation.alphas for at in read.points], np.radians([[8, 6], [4, 3]]))
+    assert [points.Point.of(at.name, at.values()) for at in read.points] == list(read.points)
+    drawn = perturb(read.joint, read.points[1].operation, sampling.draw(read))
+    np.testing.assert_allclose(drawn["alpha"][0], np.radians([4, 3]))
+    too_far = refused(with_points(WHOLE).replace('"3 deg"', '"93 deg"'))
+    assert too_far == ["operation[1].alpha2: a Cardan joint cannot turn at 93 deg | give less than 90 deg"]
+    one = refused(with_points(JOINT + SCATTER.replace("joint*.", "") + RANDOM))
+    assert one == ["operation[1].alpha2: has no effect: there is one joint | add [shaft], or remove it"]
+
+
 @pytest.mark.parametrize(
     ("entries", "scattering"),
     [

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from tolstat.common import units
 from tolstat.common.cardan import CARDAN, MECHANISMS, SHAFT, SPLINED, named
@@ -24,10 +24,11 @@ STEEL = 7850.0
 """Density of a tube that is given by its section, kg/m^3."""
 
 
-def check_misalignment(alpha: float) -> float:
+def check_misalignment(alpha: float, info: ValidationInfo) -> float:
     """Refuse an angle at which a joint cannot turn, as a `PydanticCustomError`."""
     if not abs(alpha) < np.pi / 2:
-        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
+        key = str(info.field_name)
+        raise refuse(f"a Cardan joint cannot turn at {{{key}}}", "give less than 90 deg", key)
     return alpha
 
 

@@ -24,6 +24,7 @@ from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.perturbation import unbalances
 from tolstat.joint.sections import FREE, RIGID
+from tolstat.joint.shaft import check_misalignment
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
 
@@ -98,6 +99,8 @@ class PointEntry(Operation):
     """name of the operating point, of several ones"""
     share: Annotated[units.Number | None, Field(gt=0, le=1)] = Field(default=None, examples=["60 %"])
     """share of the service time, for lives and fatigue; given for all points or for none"""
+    alpha2: Annotated[units.Angle, AfterValidator(check_misalignment)] | None = Field(default=None, examples=["7 deg"])
+    """misalignment of joint 2 of a drive shaft at this point, in place of `shaft.alpha`"""
 
 
 def read(file: Reading) -> tuple[Point, ...]:
@@ -114,7 +117,11 @@ def read(file: Reading) -> tuple[Point, ...]:
             if entry.name in [point.name for point in points]:
                 found = f"a point {entry.name!r} exists already"
                 file.fault(f"operation[{number}].name", found, "give each point its own name")
-            of_point = _of_mechanism(file, entry)
+            of_point = _of_mechanism(file, entry, entry.alpha2)
+            if entry.alpha2 is not None and file.data.get("shaft") is None:
+                file.fault(
+                    f"operation[{number}].alpha2", "has no effect: there is one joint", "add [shaft], or remove it"
+                )
             points.append(Point(entry.name, of_point, math.nan if entry.share is None else entry.share))
     if not section:
         file.fault("operation", "has no operating point", "add one: [operation]")
@@ -136,12 +143,13 @@ def operation(file: Reading) -> Operation:
     return _of_mechanism(file, file.model(Operation, file.data["operation"], "operation"))
 
 
-def _of_mechanism(file: Reading, read: Operation) -> Operation:
-    """Operating point with joint 2 of ``[shaft]``, if the file has one."""
+def _of_mechanism(file: Reading, read: Operation, second: float | None = None) -> Operation:
+    """Operating point with joint 2 of ``[shaft]``, if the file has one, with its misalignment at this point."""
     values = {key: getattr(read, key) for key in Operation.model_fields}
     if file.shaft is None:
         return Operation.model_construct(**values)
-    return OperationOfShaft.model_construct(**values, shaft=file.shaft)
+    shaft = file.shaft if second is None else file.shaft.model_copy(update={"alpha": second})
+    return OperationOfShaft.model_construct(**values, shaft=shaft)
 
 
 def _note_shares(file: Reading, points: Sequence[Point]) -> None:
@@ -320,11 +328,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
         yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
     if any(setting.joint.shaft.spline for setting in of_shafts):
-        yield (
-            ("joint", "shaft", "spline"),
-            "is that of one joint",
-            "write shaft.spline, that of the tubes, or remove it",
-        )
+        remedy = "write shaft.spline, that of the tubes, or remove it"
+        yield ("joint", "shaft", "spline"), "is that of one joint", remedy
     for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
         yield ("solver", "fidelity"), *texts
 
@@ -379,14 +384,9 @@ def note_on_pins(toleranced: Iterable[str], mechanism: Mechanism) -> str:
     Parameters
     ----------
     toleranced : iterable of str
-        Errors and zones that scatter.
+        Errors and zones that scatter; without one along a pin there is nothing to say.
     mechanism : Mechanism
-        What is simulated.
-
-    Returns
-    -------
-    str
-        Empty with thrust faces, or where no error along a pin scatters.
+        What is simulated; with thrust faces there is nothing to say.
     """
     along = any(column.endswith(".offset_e") for name in toleranced for column in columns_of(name))
     if not along or mechanism.faces:

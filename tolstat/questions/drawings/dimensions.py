@@ -67,14 +67,16 @@ def _of_joint(joint: Joint) -> list[Line]:
 
 def _of_points(points: Sequence[Point]) -> Iterator[Line]:
     """Lines of operating points: of one without a name its misalignment, as a joint file has no more."""
-    of = "of joint 1" if isinstance(points[0].operation, OperationOfShaft) else "of the shafts"
+    of = "of both joints" if isinstance(points[0].operation, OperationOfShaft) else "of the shafts"
     for name, operation, share in points:
         if name:
-            motion = f"{_deg(operation.alpha)}, {operation.speed * 30 / np.pi:.5g} rpm, {operation.torque:.5g} N m"
+            alphas = " and ".join(map(_deg, operation.alphas))
+            motion = f"{alphas}, {operation.speed * 30 / np.pi:.5g} rpm, {operation.torque:.5g} N m"
             time = "" if isnan(share) else f"; {text.percent(share)} of the time"
             yield f"operation.{name}", motion, f"misalignment {of}, speed, torque{time}"
         else:
-            yield "operation.alpha", _deg(operation.alpha), f"misalignment {of}"
+            for key, alpha in zip(("operation.alpha", "shaft.alpha"), operation.alphas, strict=False):
+                yield key, _deg(alpha), f"misalignment {of}"
 
 
 def _of_parts(joint: Joint) -> Iterator[Line]:
@@ -94,7 +96,6 @@ def _of_parts(joint: Joint) -> Iterator[Line]:
 
 
 def _of_shaft(shaft: DriveShaft) -> Iterator[Line]:
-    yield "shaft.alpha", _deg(shaft.alpha), "misalignment of joint 2"
     if isinstance(shaft.arrangement, str):
         yield "shaft.arrangement", shaft.arrangement, ARRANGEMENTS[shaft.arrangement]
     else:

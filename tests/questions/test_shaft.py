@@ -171,7 +171,12 @@ def test_a_row_is_called_a_shaft(view, answer_of):
 
 def test_the_table_has_the_shaft(of_study):
     """Masses of the tubes: steel, 400 and 800 mm of 76 x 2.5 mm."""
-    values = {row["dimension"]: row["value"] for row in dimensions.dimensions(of_study.joint, of_study.points)}
+    rows = dimensions.dimensions(of_study.joint, of_study.points)
+    values = {row["dimension"]: row["value"] for row in rows}
+    meanings = {row["dimension"]: row["meaning"] for row in rows}
+    assert [meanings[key] for key in ("operation.alpha", "shaft.alpha")] == [
+        f"misalignment of joint {i}" for i in (1, 2)
+    ]
     mass = 7850 * np.pi / 4 * (0.076**2 - 0.071**2) * 0.4
     assert values["shaft.alpha"] == "6 deg"
     assert (values["shaft.arrangement"], values["shaft.offset"], values["shaft.length"]) == ("Z", "0 deg", "1200 mm")

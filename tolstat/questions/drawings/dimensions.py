@@ -67,15 +67,17 @@ def _of_joint(joint: Joint) -> list[Line]:
 
 def _of_points(points: Sequence[Point]) -> Iterator[Line]:
     """Lines of operating points: of one without a name its misalignment, as a joint file has no more."""
-    of = "of both joints" if isinstance(points[0].operation, OperationOfShaft) else "of the shafts"
+    of_joints = (
+        ("of joint 1", "of joint 2") if isinstance(points[0].operation, OperationOfShaft) else ("of the shafts",)
+    )
     for name, operation, share in points:
         if name:
             alphas = " and ".join(map(_deg, operation.alphas))
             motion = f"{alphas}, {operation.speed * 30 / np.pi:.5g} rpm, {operation.torque:.5g} N m"
             time = "" if isnan(share) else f"; {text.percent(share)} of the time"
-            yield f"operation.{name}", motion, f"misalignment {of}, speed, torque{time}"
+            yield f"operation.{name}", motion, f"misalignment {' and '.join(of_joints)}, speed, torque{time}"
         else:
-            for key, alpha in zip(("operation.alpha", "shaft.alpha"), operation.alphas, strict=False):
+            for key, alpha, of in zip(("operation.alpha", "shaft.alpha"), operation.alphas, of_joints, strict=False):
                 yield key, _deg(alpha), f"misalignment {of}"
 
 

@@ -95,6 +95,24 @@ def with_points(text: str) -> str:
     return text[:begin] + POINTS + text[end:]
 
 
+@pytest.mark.parametrize(
+    ("spline", "names", "lengths"), [("", ["tube"], [1.2]), (SPLINE, ["tube1", "tube2"], [0.6, 0.6])]
+)
+def test_the_grade_of_a_tube_is_for_its_own_mass(spline: str, names: list[str], lengths: list[float]) -> None:
+    """G 16 at 3000 rpm: 16 mm/s over 314 rad/s, times the mass of 76 x 2.5 mm of steel; the output shaft has none."""
+    grade = ', unbalance = { grade = "16 mm/s", speed = "3000 rpm", angle = "90 deg" } }'
+    text = WHOLE.replace(' wall = "2.5 mm" }', f' wall = "2.5 mm"{grade}') + spline
+    read = load(text)
+    assert read.mechanism.unbalanced == (*names, "output")
+    assert points.Point.of("", read.points[0].values()) == read.points[0]
+    row = perturb(read.joint, read.operation, sampling.draw(read))[0]
+    mass = 7850 * np.pi / 4 * (0.076**2 - 0.071**2) * np.array([*lengths, 0.0])
+    np.testing.assert_allclose(row["unbalance"], np.outer(0.016 / (100 * np.pi) * mass, [0, 1]), atol=1e-15)
+    turned = refused(text.replace(', angle = "90 deg"', ""))
+    assert turned[0].startswith('shaft.tube.unbalance: has no direction | write "tube*.unbalance_angle" = ')
+    assert "only shafts with shaft.tube.unbalance have it" in refused(toleranced(f'"tube.unbalance" = {ENTRY}'))[0]
+
+
 def test_joint_2_may_have_an_angle_at_each_operating_point() -> None:
     read = load(with_points(WHOLE))
     np.testing.assert_allclose([at.operation.alphas for at in read.points], np.radians([[8, 6], [4, 3]]))

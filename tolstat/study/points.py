@@ -319,8 +319,8 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
     for body, (unbalance, _) in (found for s in settings for found in unbalances(s.joint, s.operation).items()):
         if unbalance and unbalance.angle is None and not varied.get(f"{body}.unbalance_angle"):
             uniform = '{ plus_minus = "180 deg", distribution = "uniform" }'
-            remedy = f'write "*.unbalance_angle" = {uniform} under [tolerances], or give its angle'
-            path = ("joint", "shaft") if body == "output" else ("shaft", "tube")
+            path, bodies = (("joint", "shaft"), body) if body == "output" else (("shaft", "tube"), "tube*")
+            remedy = f'write "{bodies}.unbalance_angle" = {uniform} under [tolerances], or give its angle'
             yield (*path, "unbalance"), "has no direction", remedy
     if any(setting.joint.thrust is None for setting in of_shafts):
         found = "missing: pins that slide freely locate no tube across its axis"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.fields import Field
-from tolstat.common.mechanism import Mechanism
+from tolstat.common.mechanism import Mechanism, carried
 
 
 class Place(NamedTuple):
@@ -174,14 +174,16 @@ _DRIVE = f"torque about the input shaft {OVER}"
 def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     """All kinds by key, in the order of reports and of kernels; those that a mechanism lacks have no places."""
     bushings = tuple(bushing.name for bushing in mechanism.bushings)
-    pins, shafts = tuple(pair.pin for pair in mechanism.pairs), tuple(shaft.name for shaft in mechanism.shafts)
+    pins = tuple(pair.pin for pair in mechanism.pairs)
+    shafts = tuple(mechanism.shafts[i].name for i in carried(mechanism))
+    whole = JOINT if mechanism.rotations else ()
     driven = tuple(shaft.name for shaft in mechanism.shafts if shaft.driven)
     borne = tuple(shaft.name for shaft in mechanism.shafts if shaft.borne)
     faces = tuple(face.name for face in mechanism.faces)
     bushing: dict[str, Any] = {"decides": True, "shown": True, "averaged": True, "modulus": True}
     F = Kind("F", "F", "bushing force", "N", _FORCE, bushings, components=("F_e", "F_t", "F_z"), **bushing)
     T = Kind("T", "T", _ROOT, "N*m", _TORQUE, bushings, components=("T_e", "T_t", "T_z"), **bushing)
-    psi = Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False)
+    psi = Kind("psi", "psi", "|Psi|", "1", _PSI, whole, interpolated=False)
     of_force: dict[str, Any] = {"unit": "N", "measure": F, "decides": True}
     # of placed members, the moments about their origins are small differences of large ones
     of_moment: dict[str, Any] = {"unit": "N*m", "measure": T, "decides": not mechanism.placed}
@@ -205,7 +207,7 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
         ("lateral", "lateral force", "N", shafts, F),
         ("moment", "bending moment", "N*m", shafts, T),
         ("drive", "driving torque", "N*m", driven, T),
-        ("psi", "speed error Psi", "1", JOINT, psi),
+        ("psi", "speed error Psi", "1", whole, psi),
         ("bearing_a", "load of bearing a", "N", borne, F),
         ("bearing_b", "load of bearing b", "N", borne, F),
     )

@@ -253,6 +253,12 @@ def features(mechanism: Mechanism) -> tuple[str, ...]:
     return tuple(lump.name for names in (pins, holes) for lump in mechanism.lumps if lump.name in names)
 
 
+def carried(mechanism: Mechanism) -> list[int]:
+    """Numbers of the shafts whose loads are loads of the mechanism: those that move."""
+    held = {member.name for member in mechanism.members if member.motion == HELD}
+    return [i for i, shaft in enumerate(mechanism.shafts) if shaft.member not in held]
+
+
 @cache
 def prefixes(mechanism: Mechanism) -> tuple[str, ...]:
     """What stands before the names of the parts of each Cardan joint, ``""`` or ``"joint1."``."""
@@ -303,6 +309,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "turn": [unknown.get(shaft.turns, -1) for shaft in mechanism.shafts],
         "slide": [unknown.get(shaft.slides, -1) for shaft in mechanism.shafts],
         "across": [unknown[shaft.across[0]] if shaft.across else -1 for shaft in mechanism.shafts],
+        "carried": carried(mechanism),
         "driven": [i for i, shaft in enumerate(mechanism.shafts) if shaft.driven],
         "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
         "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],

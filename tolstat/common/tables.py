@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.error_fields import error_fields
 from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
-from tolstat.common.mechanism import Mechanism, features, prefixes
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import numbers, param_fields
 
 SCHEMA_VERSION = 14
@@ -207,44 +208,6 @@ class Simulation(NamedTuple):
     histories: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
 
 
-def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
-    """Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
-    fields = []
-    pins = [pair.pin for pair in mechanism.pairs]
-    for feature in features(mechanism):
-        kind = "pin" if feature in pins else "hole"
-        for axis in "etz":
-            text = f"position error of the {kind} axis along {axis}"
-            fields.append(Field(f"{feature}.offset_{axis}", "m", text))
-        for axis in "tz":
-            fields.append(Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}"))
-        fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
-    fields += [
-        Field("operation.alpha", "rad", "deviation of the shafts' misalignment from that of the operating point"),
-        Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
-        Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
-        Field("material.E_factor", "1", "factor on Young's modulus: bushings, their damping, contact coefficients"),
-        *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in pins),
-        Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
-        Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
-        Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
-    ]
-    of_parts = (
-        (mechanism.is_shaft, "shaft.alpha", "rad", "deviation of the misalignment of joint 2"),
-        (mechanism.is_shaft, "shaft.offset", "rad", "deviation of the phase of the forks on the tube"),
-        (mechanism.spline, "shaft.spline", "1", "axial force of the sticking spline over 2 mu T/d, from -1 to 1"),
-        (mechanism.friction, "friction.mu", "1", "deviation of the coefficient of friction"),
-    )
-    fields += [Field(name, unit, text) for there, name, unit, text in of_parts if there]
-    for body in mechanism.unbalanced:
-        owner = "output shaft" if body == "output" else body
-        fields.append(Field(f"{body}.unbalance", "kg*m", f"deviation of the {owner}'s unbalance"))
-        fields.append(Field(f"{body}.unbalance_angle", "rad", "deviation of its direction"))
-    for prefix in prefixes(mechanism) if mechanism.faces else ():
-        fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
-    return tuple(fields)
-
-
 FACTORS = ("material.E_factor", "operation.speed_swing", "operation.torque_swing")
 """Errors that are factors, 1 for the nominal joint."""
 
@@ -343,7 +306,7 @@ class Tables(NamedTuple):
 @cache
 def tables(mechanism: Mechanism) -> Tables:
     """Tables of a mechanism."""
-    errors, results = _error_fields(mechanism), _result_fields(mechanism)
+    errors, results = error_fields(mechanism), _result_fields(mechanism)
     return Tables(
         errors, results, dtype_of(errors), dtype_of(param_fields(mechanism)), *_layouts(results, kinds(mechanism))
     )

@@ -19,8 +19,10 @@ from tolstat.common.mechanism import OBLIQUE, Mechanism
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict
 from tolstat.common.tables import FACTORS, blank_params, tables
-from tolstat.joint import material, orders
+from tolstat.joint import linked, material, orders
 from tolstat.joint.contact import Contact
+from tolstat.joint.linkage import Linkage
+from tolstat.joint.linked import linkage_mechanism
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Unbalance
@@ -88,6 +90,22 @@ class OperationOfShaft(Operation):
         return self.alpha, self.shaft.alpha
 
 
+class OperationOfLinkage(Operation):
+    """Operating point of a linkage: speed of its drive, in periods of a swing that turns to and fro, and torque."""
+
+    alpha: units.Angle = Field(default=0.0, exclude=True)
+    """has no effect"""
+    torque: units.Torque = Field(default=0.0, examples=["100 N*m"])
+    """torque on the member that is `loaded`, against its axis"""
+    linkage: Linkage
+    """the linkage"""
+
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """See `Operation.alphas`."""
+        return ()
+
+
 MEANS = ("alpha", "speed", "torque", "axial_force")
 """Numbers of an operating point; errors of it are deviations from them."""
 SPLINE = "shaft.spline"
@@ -95,7 +113,9 @@ SPLINE = "shaft.spline"
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
-    """What is simulated: a joint or a drive shaft, with the parts that the joint has."""
+    """What is simulated: a joint, a drive shaft or a linkage, with the parts that the joint has."""
+    if isinstance(operation, OperationOfLinkage):
+        return linkage_mechanism(operation.linkage, joint)
     shaft = _shaft_of(operation)
     base = CARDAN if shaft is None else shaft.mechanism
     return MECHANISMS[named(base, joint.parts if shaft is None else (*joint.parts, *shaft.parts))]
@@ -138,7 +158,11 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    values = {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
+    deviations = errors.dtype.names or ()
+    values = {name: np.full(len(errors), getattr(operation, name)) for name in MEANS}
+    for name in MEANS:
+        if f"operation.{name}" in deviations:
+            values[name] += errors[f"operation.{name}"]
     if spline is not None:
         values["axial_force"] = values["axial_force"] + _sticking(errors, spline, values["torque"])
     return values
@@ -176,20 +200,19 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     shaft = _shaft_of(operation)
     for name, value in _constants(joint).items():
         params[name] = value
-    for name, of_kinds in _of_kinds(joint, shaft).items():
-        kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
-        params[name] = [of_kinds[kind] for kind in kinds]
-    point = operating(operation, errors, joint.shaft.spline)
-    params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
-    lumps = mechanism.lumps
-    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
-    if shaft is not None:
-        params["plane"][:, 1], params["span"][:, 1] = shaft.plane, shaft.length
-        params["alpha"][:, 1] = shaft.alpha + errors["shaft.alpha"]
-        params["ahead"][:, 1] = 0.5 * np.pi + shaft.offset + errors["shaft.offset"]
-        triads |= _on_tube(params["ahead"][:, 1] + shaft.plane)
-        params["triad"] = np.stack(np.broadcast_arrays(*(triads[lump.name] for lump in lumps)), axis=1)
-    if joint.shaft.slides:
+    closed = isinstance(operation, OperationOfLinkage)
+    point = operating(operation, errors, None if closed else joint.shaft.spline)
+    params["omega"], params["torque"] = point["speed"], point["torque"]
+    own = [0.0] * len(mechanism.pairs)
+    if isinstance(operation, OperationOfLinkage):
+        own = linked.added_clearances(operation.linkage, joint)
+        for name, value in linked.constants(operation.linkage, joint, mechanism).items():
+            params[name] = value
+        triads = dict(zip((lump.name for lump in mechanism.lumps), params["triad"][:1].swapaxes(0, 1), strict=True))
+    else:
+        triads = _of_joints(joint, shaft, errors, mechanism, params)
+        params["alpha"][:, 0] = point["alpha"]
+    if joint.shaft.slides and not closed:
         params["F_a"] = point["axial_force"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
     for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
@@ -203,13 +226,14 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     for i, (pin, hole, _) in enumerate(mechanism.pairs):
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
-        deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"])
+        deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"] + own[i])
         params["clearance"][:, i] = _clearance(joint.contact, *deviations)
     if joint.thrust is not None:
         half = 0.5 * joint.contact.z
         for i, face in enumerate(mechanism.faces):
-            play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
-            params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+            own = f"{face.name.rstrip('1234')}.end_play" if mechanism.cardan else f"{face.pin}.end_play"
+            play = joint.thrust.end_play + errors[own]
+            params["face_at"][:, i] = face.end * np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if shaft is not None and shaft.spline is not None:
         params["push"] = _sticking(errors, shaft.spline, point["torque"])
     of_bodies = unbalances(joint, operation)
@@ -223,18 +247,55 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     return params
 
 
+def _of_joints(
+    joint: Joint, shaft: DriveShaft | None, errors: Table, mechanism: Mechanism, params: Table
+) -> dict[str, Array]:
+    """Write what is of Cardan joints alone; return the triads of their lumps, rows e, t, z in axes of the member."""
+    for name, value in _of_ends(joint).items():
+        params[name] = value
+    for name, of_kinds in _of_kinds(joint, shaft).items():
+        kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
+        params[name] = [of_kinds[kind] for kind in kinds]
+    lumps = mechanism.lumps
+    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
+    if shaft is not None:
+        params["plane"][:, 1], params["span"][:, 1] = shaft.plane, shaft.length
+        params["alpha"][:, 1] = shaft.alpha + errors["shaft.alpha"]
+        params["ahead"][:, 1] = 0.5 * np.pi + shaft.offset + errors["shaft.offset"]
+        triads |= _on_tube(params["ahead"][:, 1] + shaft.plane)
+        params["triad"] = np.stack(np.broadcast_arrays(*(triads[lump.name] for lump in lumps)), axis=1)
+    return triads
+
+
 def _constants(joint: Joint) -> dict[str, Any]:
-    """Parameters that do not depend on the errors, at factor 1 on E."""
-    contact, shaft, stations = joint.contact, joint.shaft, joint.contact.springs(joint.bearing)
+    """Parameters of pins in their holes that do not depend on the errors, at factor 1 on E."""
+    contact, stations = joint.contact, joint.contact.springs(joint.bearing)
     unused = (0, MAX_STATIONS - len(stations.s))
     return {
-        "R": joint.cross.R,
-        "Js": shaft.Js,
         "face_k": joint.thrust.k if joint.thrust else 0.0,
         "face_c": joint.thrust.c if joint.thrust else 0.0,
         "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
         "mu_ratio": joint.friction.ratio,
         "slip_speed": joint.friction.slip_speed,
+        "c_d": contact.c_d,
+        "c_t": contact.c_t,
+        "delta_d": contact.delta_d,
+        "n_stations": len(stations.s),
+        "station_s": np.pad(stations.s, unused),
+        "station_k1": np.pad(stations.k1, unused),
+        "station_k2": np.pad(stations.k2, unused),
+        "station_k3": np.pad(stations.k3, unused),
+        "station_weight": np.pad(stations.weight, unused),
+        "needle_b": stations.b,
+    }
+
+
+def _of_ends(joint: Joint) -> dict[str, Any]:
+    """Parameters of the shafts at both ends, and of the cross."""
+    shaft = joint.shaft
+    return {
+        "R": joint.cross.R,
+        "Js": shaft.Js,
         "bearing_at": np.reshape(
             [
                 sign * np.array(ends.bearings)
@@ -249,16 +310,6 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "c_l": 2 * joint.bushing.xi * math.sqrt(shaft.k_l * (shaft.mass or 0.0)),
         "k_a": shaft.k_a,
         "c_a": shaft.axial_damping if shaft.slides else 0.0,
-        "c_d": contact.c_d,
-        "c_t": contact.c_t,
-        "delta_d": contact.delta_d,
-        "n_stations": len(stations.s),
-        "station_s": np.pad(stations.s, unused),
-        "station_k1": np.pad(stations.k1, unused),
-        "station_k2": np.pad(stations.k2, unused),
-        "station_k3": np.pad(stations.k3, unused),
-        "station_weight": np.pad(stations.weight, unused),
-        "needle_b": stations.b,
     }
 
 

@@ -86,8 +86,8 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate, mech
         return
     coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 3
     sharp = bool(mechanism.faces) or mechanism.friction
-    swinging = np.where(results["psi_max"] > SWINGING_PSI, SWINGING_STEP_ERROR, STEP_ERROR)
-    allowed = np.where(sharp, SHARP_STEP_ERROR, swinging) * coarse
+    swings = results["psi_max"] > SWINGING_PSI if mechanism.rotations else False
+    allowed = np.where(sharp, SHARP_STEP_ERROR, np.where(swings, SWINGING_STEP_ERROR, STEP_ERROR)) * coarse
     unsure = (results["status"] == Status.OK) & (results["step_error"] > allowed)
     if sharp:
         unsure[_with_finer_steps(np.flatnonzero(unsure), results, options, simulate)] = False

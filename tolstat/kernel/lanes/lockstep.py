@@ -97,7 +97,7 @@ def finish_joint(lane, status, options, batch, queue):
     elif status == NEWTON_FAILED:
         failed = control.k[lane] if options.fidelity == DYNAMIC else -1
     else:
-        if options.fidelity == QUASISTATIC:
+        if options.fidelity == QUASISTATIC and par.Js.shape[0] > 0:
             speed_ratios(par, samples)
         summarise(par, samples, out)
         if is_finite(out):

@@ -95,14 +95,15 @@ def write_loads(v, par, work):
     for pin in range(work.contact.shape[0]):
         for i in range(len(CONTACTS)):
             loads[begin[CONTACT_FORCES] + len(CONTACTS) * pin + i] = work.contact[pin, i]
-    loads[begin[SPEED_ERROR]] = abs(work.output[1])
-    for shaft in range(work.shafts.shape[0]):
-        f, m = shaft_load(shaft, par, work)
-        loads[begin[AXIAL] + shaft] = abs(f[2])
-        loads[begin[LATERAL] + shaft] = f[0] * f[0] + f[1] * f[1]
-        loads[begin[MOMENT] + shaft] = m[0] * m[0] + m[1] * m[1]
+    if par.Js.shape[0] > 0:
+        loads[begin[SPEED_ERROR]] = abs(work.output[1])
+    for j in range(par.carried.shape[0]):
+        f, m = shaft_load(par.carried[j], par, work)
+        loads[begin[AXIAL] + j] = abs(f[2])
+        loads[begin[LATERAL] + j] = f[0] * f[0] + f[1] * f[1]
+        loads[begin[MOMENT] + j] = m[0] * m[0] + m[1] * m[1]
         for i in range(par.driven.shape[0]):
-            if par.driven[i] == shaft:
+            if par.driven[i] == par.carried[j]:
                 loads[begin[DRIVE] + i] = abs(m[2])
     for face in range(par.face_pair.shape[0]):
         loads[begin[THRUST] + face] = work.face[face, FORCE]

@@ -50,16 +50,16 @@ def of_order(i, par, samples, out):
     n, number = samples.size, len(ORDERS)
     turn_c, turn_s = math.cos(2 * math.pi * ORDERS[i] / n), -math.sin(2 * math.pi * ORDERS[i] / n)
     none = (0.0, 0.0)
-    for shaft in range(par.turn.shape[0]):
-        c, s = 1.0, 0.0
+    for k in range(par.carried.shape[0]):
+        shaft, c, s = par.carried[k], 1.0, 0.0
         fx = fy = mx = my = mz = none
-        for k in range(n):
-            of = samples[k].shafts[shaft]
+        for point in range(n):
+            of = samples[point].shafts[shaft]
             fx, fy, mx, my = plus(fx, of[0], c, s), plus(fy, of[1], c, s), plus(mx, of[3], c, s), plus(my, of[4], c, s)
             mz = plus(mz, of[5], c, s)
             c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-        out.largest[par.begin[LATERAL_ORDERS] + number * shaft + i] = semi_major(fx, fy, n)
-        out.largest[par.begin[MOMENT_ORDERS] + number * shaft + i] = semi_major(mx, my, n)
+        out.largest[par.begin[LATERAL_ORDERS] + number * k + i] = semi_major(fx, fy, n)
+        out.largest[par.begin[MOMENT_ORDERS] + number * k + i] = semi_major(mx, my, n)
         for j in range(par.borne.shape[0]):
             if par.borne[j] == shaft:
                 near_x, near_y, far_x, far_y = bearing_sums(j, fx, fy, mx, my, par)
@@ -70,10 +70,11 @@ def of_order(i, par, samples, out):
                 out.largest[par.begin[DRIVE_ORDERS] + number * j + i] = semi_major(mz, none, n)
     c, s = 1.0, 0.0
     psi = none
-    for k in range(n):
-        psi = plus(psi, samples[k].psi, c, s)
+    for point in range(n):
+        psi = plus(psi, samples[point].psi, c, s)
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-    out.largest[par.begin[PSI_ORDERS] + i] = semi_major(psi, none, n)
+    if par.Js.shape[0] > 0:
+        out.largest[par.begin[PSI_ORDERS] + i] = semi_major(psi, none, n)
 
 
 @njit

@@ -1,0 +1,219 @@
+"""A closed chain of members that pins join, from a file: members, pairs, and what drives it (docs/mechanisms.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from tolstat.common import units
+from tolstat.common.strict import Strict, refuse
+from tolstat.joint import chain
+from tolstat.joint.chain import GROUND, Chain, Joined
+from tolstat.joint.material import Array
+from tolstat.joint.sections import Length, Triple
+
+ENDS = {"outer": (1,), "inner": (-1,), "both": (1, -1), "none": ()}
+"""Ends of a pin that have a thrust face, by the word of `PairOf.faces`."""
+GRAVITY = 9.81
+"""Acceleration by gravity, m/s^2."""
+
+
+def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not np.linalg.norm(value) > 0.0:
+        raise refuse("{direction} is no direction", "give the components of a vector, such as [0, 0, 1]", "direction")
+    return value
+
+
+Place = Annotated[tuple[units.Length, units.Length, units.Length], Field(examples=[["0 mm", "0 mm", "120 mm"]])]
+Direction = Annotated[
+    tuple[units.Number, units.Number, units.Number], AfterValidator(_direction), Field(examples=[[0, 0, 1]])
+]
+
+
+class MemberOf(Strict):
+    """A member: a rigid body between its pins and eyes, in ground axes as the mechanism stands at the angle zero."""
+
+    mass: units.Mass = Field(examples=["4 kg"])
+    """mass, without the lumps of its pins and eyes"""
+    centre: Place
+    """mass centre"""
+    inertia: Triple = Field(examples=[["0.003 kg*m^2", "0.05 kg*m^2", "0.05 kg*m^2"]])
+    """principal moments of inertia through the mass centre, about `axis` and the two directions that follow from it"""
+    axis: Direction = (1.0, 0.0, 0.0)
+    """first principal axis; the second is the ground's x made perpendicular to it, or y where `axis` lies along x"""
+
+
+class PairOf(Strict):
+    """A pin of one member in the eye of another."""
+
+    pin: str = Field(examples=["crank"])
+    """member that carries the pin, or `ground`"""
+    eye: str = Field(examples=["coupler"])
+    """member that carries the eye, or `ground`"""
+    point: Place
+    """middle of pin and eye, in ground axes at the angle zero"""
+    axis: Direction
+    """direction e of the pin, outwards, in ground axes at the angle zero"""
+    t: Direction | None = Field(default=None, examples=[[1, 0, 0]])
+    """direction t of errors and bushings of the pin, made perpendicular to `axis`; when left out: the ground's x, or y
+    where `axis` lies along x"""
+    eye_t: Direction | None = Field(default=None, examples=[[1, 0, 0]])
+    """the same of the eye, whose beam lies along z = e x t; when left out: `t`"""
+    clearance: Length | None = Field(default=None, examples=["0.02 mm"])
+    """radial clearance; when left out: that of the joint's contact"""
+    faces: Literal["outer", "inner", "both", "none"] = "both"
+    """ends of the pin that have a thrust face, where the joint has `thrust`"""
+
+
+class Drive(Strict):
+    """What moves the mechanism: a member that turns in the ground, or swings.
+
+    A driven member without a pair in the ground is held like the end of a motor's shaft; else its turn alone is given.
+    """
+
+    member: str = Field(examples=["crank"])
+    """the driven member"""
+    point: Place | None = None
+    """a point of its axis; when left out: that of its first pair in the ground"""
+    axis: Direction | None = None
+    """its axis, about which it turns to the right for a positive speed; when left out: that of this pair"""
+    swing: tuple[units.Angle, units.Angle] | None = Field(default=None, examples=[["-30 deg", "60 deg"]])
+    """the angles between which it swings once to and fro in each period, from the first one; the angle zero is the one
+    that the file describes. When left out: it turns"""
+
+
+class Linkage(Strict):
+    """A mechanism: members that pins join to a closed chain. Pins and eyes are those of the joint of the study."""
+
+    description: str = Field(default="", examples=["flap, drawing 815"])
+    """text about the mechanism"""
+    member: dict[str, MemberOf] = Field(default={}, examples=[{}])
+    """Members that move, by name, without a driven one that is held"""
+    pair: dict[str, PairOf] = Field(min_length=1, examples=[{}])
+    """Pairs of a pin and an eye, by name"""
+    drive: Drive
+    """What moves it"""
+    loaded: str = Field(default="", examples=["rocker"])
+    """member that `operation.torque` acts on, about the axis of its first pair, against the direction of this axis;
+    when left out: there is no torque"""
+    down: Direction | None = Field(default=None, examples=[[0, 0, -1]])
+    """direction of gravity; when left out: no weight"""
+
+    @field_validator("member")
+    @classmethod
+    def _names(cls, value: dict[str, MemberOf]) -> dict[str, MemberOf]:
+        if GROUND in value:
+            raise refuse("ground does not move", "remove it")
+        return value
+
+    @model_validator(mode="after")
+    def _joins(self) -> Linkage:
+        faults = list(self._faults())
+        if faults:
+            raise refuse("; ".join(found for found, _ in faults), "; ".join(remedy for _, remedy in faults))
+        return self
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """What does not go together: members without pair, mass or place; the drive; the load."""
+        in_pairs = dict.fromkeys(name for pair in self.pair.values() for name in (pair.pin, pair.eye))
+        for name, pair in self.pair.items():
+            if pair.pin == pair.eye:
+                yield f"pair.{name}: pin and eye are both of {pair.pin}", "give two members"
+        driven = self.drive.member
+        if driven == GROUND or driven not in in_pairs:
+            yield f"drive.member: {driven!r} is in no pair", f"write one of {', '.join(set(in_pairs) - {GROUND})}"
+            return
+        for name in (name for name in self.member if name not in in_pairs):
+            yield f"member.{name} is in no pair", "add a pair, or remove it"
+        held = "" if self.turns_alone else driven
+        for name in (name for name in in_pairs if name not in (GROUND, held, *self.member)):
+            yield f"member.{name} is missing: pairs name it", "give its mass, centre and inertia, or correct the name"
+        if held in self.member:
+            yield f"member.{held} has no effect: the drive holds it", "remove it, or give it a pair in the ground"
+        if not self.turns_alone and None in (self.drive.point, self.drive.axis):
+            yield "drive has no axis: the driven member has no pair in the ground", "give drive.point and drive.axis"
+        if self.turns_alone and driven in self.member and not self._along_a_principal_axis:
+            yield f"member.{driven}: no principal axis lies along the axis of the drive", "give member.axis along it"
+        if self.loaded and self.loaded not in self.member:
+            yield f"loaded = {self.loaded!r} is no member that moves freely", f"write one of {', '.join(self.member)}"
+
+    @property
+    def turns_alone(self) -> bool:
+        """Whether the turn alone of the driven member is given: it has pairs in the ground."""
+        return bool(self._in_ground)
+
+    @property
+    def drive_axis(self) -> Array:
+        """Unit vector of the axis of the drive."""
+        given = [self.drive.axis] if self.drive.axis else [pair.axis for pair in self._in_ground]
+        return unit(given[0])
+
+    @property
+    def _in_ground(self) -> list[PairOf]:
+        both = {GROUND, self.drive.member}
+        return [pair for pair in self.pair.values() if {pair.pin, pair.eye} == both]
+
+    @property
+    def _along_a_principal_axis(self) -> bool:
+        axes = triad(unit(self.member[self.drive.member].axis))
+        return bool(np.abs(axes @ self.drive_axis).max() > 1.0 - 1e-6)
+
+    @property
+    def chain(self) -> Chain:
+        """Its ideal motion.
+
+        Raises
+        ------
+        InputError
+            Where it does not move, or moves in more than one way.
+        """
+        return _chain_of(self.model_dump_json())
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Linkage:
+        """Linkage from its values in SI units, as result files hold them."""
+        made = {
+            "member": {name: MemberOf.model_construct(**each) for name, each in values["member"].items()},
+            "pair": {name: PairOf.model_construct(**each) for name, each in values["pair"].items()},
+            "drive": Drive.model_construct(**values["drive"]),
+        }
+        return cls.model_construct(**{**values, **made})
+
+    @property
+    def in_words(self) -> str:
+        """``"4 members, 3 pairs, crank turns"``."""
+        members = {name for pair in self.pair.values() for name in (pair.pin, pair.eye)}
+        how = "swings" if self.drive.swing else "turns"
+        return f"{len(members)} members, {len(self.pair)} pairs, {self.drive.member} {how}"
+
+
+@lru_cache(maxsize=64)
+def _chain_of(text: str) -> Chain:
+    linkage = Linkage.model_validate_json(text)
+    pairs = {
+        name: Joined(pair.pin, pair.eye, np.array(pair.point), unit(pair.axis)) for name, pair in linkage.pair.items()
+    }
+    points = [linkage.drive.point] if linkage.drive.point else [pair.point for pair in linkage._in_ground]
+    drive = Joined(GROUND, linkage.drive.member, np.array(points[0]), linkage.drive_axis)
+    return chain.solve(pairs, drive, linkage.drive.swing)
+
+
+def unit(direction: tuple[float, float, float]) -> Array:
+    """Unit vector."""
+    return np.array(direction) / np.linalg.norm(direction)
+
+
+def triad(axis: Array, t: tuple[float, float, float] | None = None) -> Array:
+    """Rows e, t, z of the triad of an axis: t the given direction, or x, made perpendicular; y where e is along x."""
+    for other in (t, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        across = np.zeros(3) if other is None else np.array(other) - axis @ np.array(other) * axis
+        if np.linalg.norm(across) > 1e-3:
+            across /= np.linalg.norm(across)
+            return np.array([axis, across, np.cross(axis, across)])
+    raise AssertionError("one of x and y is across")
+
+

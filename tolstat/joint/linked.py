@@ -1,0 +1,167 @@
+"""The mechanism that a linkage is, and its parameters that do not depend on the errors of its pins and eyes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from tolstat.common.mechanism import (
+    DRIVEN,
+    GENERAL,
+    HELD,
+    OBLIQUE,
+    SERIES,
+    Bushing,
+    Face,
+    Hinge,
+    Lump,
+    Mechanism,
+    Member,
+    Pair,
+    Shaft,
+)
+from tolstat.joint import material
+from tolstat.joint.chain import GROUND, Chain
+from tolstat.joint.linkage import ENDS, GRAVITY, Linkage, triad, unit
+from tolstat.joint.material import Array
+from tolstat.joint.model import Joint
+
+LINKAGE = "linkage"
+"""Name of all mechanisms that a file describes."""
+STIFF = 1e9
+"""Torsional stiffness by which the turn of a driven member is given that has pairs in the ground, N m/rad."""
+
+
+@lru_cache(maxsize=64)
+def _mechanism(text: str, faces: bool, friction: bool) -> Mechanism:
+    linkage = Linkage.model_validate_json(text)
+    chain, driven, pairs = linkage.chain, linkage.drive.member, linkage.pair
+    own = {name: name if name in linkage.member else _shaft(name) for name in (GROUND, *chain.members)}
+    turning = SERIES if linkage.drive.swing else DRIVEN
+    motions = {name: turning if name == driven else SERIES for name in chain.members}
+    return Mechanism(
+        LINKAGE,
+        members=(
+            Member(GROUND, HELD),
+            *(Member(name, motions[name], parent=of.parent) for name, of in chain.members.items()),
+        ),
+        lumps=(
+            *(Lump(f"{name}.pin", pair.pin, f"{name}.pin", OBLIQUE) for name, pair in pairs.items()),
+            *(Lump(f"{name}.eye", pair.eye, f"{name}.eye", OBLIQUE) for name, pair in pairs.items()),
+            *(Lump(name, name, name, OBLIQUE) for name in linkage.member),
+        ),
+        shafts=(Shaft(_shaft(GROUND), GROUND), Shaft(_shaft(driven), driven, driven=True)),
+        bushings=(
+            *(
+                Bushing(f"{name}.{side}", f"{name}.{side}", own[member], f"{name}.{side}", side)
+                for name, pair in pairs.items()
+                for side, member in (("pin", pair.pin), ("eye", pair.eye))
+            ),
+            *[Bushing(f"{driven}.drive", driven, _shaft(driven), "drive", "drive")] * linkage.turns_alone,
+        ),
+        hinges=tuple(Hinge(name, pair.pin, pair.eye, GENERAL) for name, pair in pairs.items()),
+        pairs=tuple(Pair(f"{name}.pin", f"{name}.eye", name) for name in pairs),
+        faces=tuple(
+            Face(f"{name}.{word}", f"{name}.pin", end)
+            for name, pair in pairs.items()
+            for word, end in (("outer", 1), ("inner", -1))
+            if faces and end in ENDS[pair.faces]
+        ),
+        friction=friction,
+        waves=len(chain.members[driven].wave) if SERIES in motions.values() else 0,
+        loaded=linkage.loaded,
+    )
+
+
+def _shaft(member: str) -> str:
+    """Name of what prescribes a member."""
+    return f"shaft of {member}"
+
+
+def linkage_mechanism(linkage: Linkage, joint: Joint) -> Mechanism:
+    """Mechanism of a linkage whose pins and eyes are those of a joint."""
+    return _mechanism(linkage.model_dump_json(), joint.thrust is not None, joint.friction.mu is not None)
+
+
+def frames(chain: Chain) -> dict[str, tuple[Array, Array]]:
+    """Axes, by columns, and origin of each member at the angle zero, in ground axes: z is the axis that it turns about."""
+    found = {GROUND: (np.eye(3), np.zeros(3))}
+    for name, of in chain.members.items():
+        z, x, y = triad(of.axis)
+        found[name] = np.column_stack([x, y, z]), of.point
+    return found
+
+
+def constants(linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str, Any]:
+    """Parameters of a linkage that the errors of its pins and eyes do not change, at factor 1 on E."""
+    chain, at = linkage.chain, frames(linkage.chain)
+    of: dict[str, Any] = {name: [] for name in ("mount", "pivot", "angle", "wave")}
+    for member in mechanism.members:
+        axes, origin = at[member.name]
+        above, start = at[member.parent or GROUND]
+        angle, wave = (0.0, 0.0), np.zeros((mechanism.waves, 2))
+        if member.motion == SERIES:
+            angle, wave = chain.members[member.name].angle, chain.members[member.name].wave
+        of["mount"].append(above.T @ axes)
+        of["pivot"].append(above.T @ (origin - start))
+        of["angle"].append(angle)
+        of["wave"].append(wave)
+    of["R"] = 0.5 * chain.size
+    of["weight"] = GRAVITY * unit(linkage.down) if linkage.down else np.zeros(3)
+    triads, points = _lumps(linkage, mechanism)
+    bodies = {name: _body(linkage, joint, name) for name in triads}
+    of["triad"] = [triads[lump.name] for lump in mechanism.lumps]
+    of["mass"], of["inertia"] = ([bodies[name][i] for name in mechanism.lump_kinds] for i in (0, 1))
+    of["at"] = [triads[name] @ points[name] for name in mechanism.lump_kinds]
+    of["k"], of["c"], of["marker"] = [], [], []
+    for bushing in mechanism.bushings:
+        mass, inertia = bodies[bushing.lump]
+        k = _stiffness(joint, bushing.group, triads[bushing.lump])
+        lever = points[bushing.lump] - points.get(bushing.base, np.zeros(3))
+        of["k"].append(k)
+        of["c"].append(material.bushing_damping(k, mass, np.array(inertia), joint.bushing.xi))
+        of["marker"].append(((0.0, 0.0, 0.0), triads[bushing.lump] @ lever))
+    return of
+
+
+def added_clearances(linkage: Linkage, joint: Joint) -> list[float]:
+    """By how much the clearance of each pair is more than that of the joint's contact, m."""
+    usual = joint.contact.clearance
+    return [0.0 if pair.clearance is None else pair.clearance - usual for pair in linkage.pair.values()]
+
+
+def _lumps(linkage: Linkage, mechanism: Mechanism) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Triad, rows in axes of its member, and reference point in its member (m), of each lump by name."""
+    at, triads, points = frames(linkage.chain), {}, {}
+    for lump in mechanism.lumps:
+        axes, origin = at[lump.member]
+        name, _, side = lump.name.rpartition(".")
+        if side in ("pin", "eye"):
+            pair = linkage.pair[name]
+            t = pair.eye_t if side == "eye" and pair.eye_t else pair.t
+            own, point = triad(unit(pair.axis), t), np.array(pair.point)
+        else:
+            member = linkage.member[lump.name]
+            own, point = triad(unit(member.axis)), np.array(member.centre)
+        triads[lump.name], points[lump.name] = own @ axes, axes.T @ (point - origin)
+    return triads, points
+
+
+def _body(linkage: Linkage, joint: Joint, name: str) -> tuple[float, tuple[float, ...]]:
+    """Mass and moments of inertia of a lump."""
+    if name in linkage.member:
+        return linkage.member[name].mass, linkage.member[name].inertia
+    of = joint.pin if name.endswith(".pin") else joint.arm
+    return of.mass, of.inertia
+
+
+def _stiffness(joint: Joint, group: str, axes: Array) -> Array:
+    """Stiffness of a bushing along and about the axes e, t, z of its lump: of pin, eye, or drive.
+
+    The drive turns a member about z of its frame, which is along one of the principal `axes` of the member.
+    """
+    if group == "drive":
+        return np.concatenate([np.zeros(3), STIFF * np.round(axes[:, 2] ** 2)])
+    return joint.k_cross if group == "pin" else joint.k_fork

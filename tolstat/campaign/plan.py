@@ -325,7 +325,7 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:
-    if mechanism.is_shaft:
+    if len(mechanism.cardan) != 1:
         return Reversals(0, None, None)
     torque = ideal.reversal_torque(params)
     here = np.abs(params["torque"]) < torque

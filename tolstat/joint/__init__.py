@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tolstat.joint.bearing import Bearing as Bearing
+    from tolstat.joint.linkage import Linkage as Linkage
     from tolstat.joint.model import Joint as Joint
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
     from tolstat.joint.perturbation import MEANS as MEANS
     from tolstat.joint.perturbation import SPLINE as SPLINE
     from tolstat.joint.perturbation import Operation as Operation
+    from tolstat.joint.perturbation import OperationOfLinkage as OperationOfLinkage
     from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
     from tolstat.joint.perturbation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
@@ -27,9 +29,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "bearing": ("Bearing",),
+    "linkage": ("Linkage",),
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": (
-        *("MEANS", "SPLINE", "Operation", "OperationOfShaft"),
+        *("MEANS", "SPLINE", "Operation", "OperationOfLinkage", "OperationOfShaft"),
         *("mechanism_of", "nominal_errors", "operating", "perturb"),
     ),
     "reading": ("load", "varied"),

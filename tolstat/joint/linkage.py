@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
@@ -110,36 +110,35 @@ class Linkage(Strict):
             raise refuse("ground does not move", "remove it")
         return value
 
-    @model_validator(mode="after")
-    def _joins(self) -> Linkage:
-        faults = list(self._faults())
-        if faults:
-            raise refuse("; ".join(found for found, _ in faults), "; ".join(remedy for _, remedy in faults))
-        return self
-
-    def _faults(self) -> Iterator[tuple[str, str]]:
-        """What does not go together: members without pair, mass or place; the drive; the load."""
+    def faults(self) -> Iterator[tuple[str, str, str]]:
+        """Key, what was found and remedy of what does not go together: of members, pairs, the drive and the load."""
         in_pairs = dict.fromkeys(name for pair in self.pair.values() for name in (pair.pin, pair.eye))
         for name, pair in self.pair.items():
             if pair.pin == pair.eye:
-                yield f"pair.{name}: pin and eye are both of {pair.pin}", "give two members"
+                yield f"pair.{name}", f"pin and eye are both of {pair.pin}", "give two members"
         driven = self.drive.member
         if driven == GROUND or driven not in in_pairs:
-            yield f"drive.member: {driven!r} is in no pair", f"write one of {', '.join(set(in_pairs) - {GROUND})}"
+            others = ", ".join(name for name in in_pairs if name != GROUND)
+            yield "drive.member", f"{driven!r} is in no pair", f"write one of {others}"
             return
-        for name in (name for name in self.member if name not in in_pairs):
-            yield f"member.{name} is in no pair", "add a pair, or remove it"
         held = "" if self.turns_alone else driven
-        for name in (name for name in in_pairs if name not in (GROUND, held, *self.member)):
-            yield f"member.{name} is missing: pairs name it", "give its mass, centre and inertia, or correct the name"
-        if held in self.member:
-            yield f"member.{held} has no effect: the drive holds it", "remove it, or give it a pair in the ground"
-        if not self.turns_alone and None in (self.drive.point, self.drive.axis):
-            yield "drive has no axis: the driven member has no pair in the ground", "give drive.point and drive.axis"
-        if self.turns_alone and driven in self.member and not self._along_a_principal_axis:
-            yield f"member.{driven}: no principal axis lies along the axis of the drive", "give member.axis along it"
+        for name in self.member:
+            if name not in in_pairs:
+                yield f"member.{name}", "is in no pair", "add a pair, or remove it"
+            elif name == held:
+                remedy = "remove it, or give it a pair in the ground"
+                yield f"member.{name}", "has no effect: the drive holds it, like the end of a motor's shaft", remedy
+        for name in in_pairs:
+            if name not in (GROUND, held, *self.member):
+                yield f"member.{name}", "missing table: a pair names it", "give mass, centre and inertia, or mend the pair"
+        if held and None in (self.drive.point, self.drive.axis):
+            found = f"has no axis: {driven} has no pair in the ground"
+            yield "drive", found, 'give point = ["0 mm", "0 mm", "0 mm"] and axis = [0, 0, 1], of yours'
+        elif driven in self.member and not self._along_a_principal_axis:
+            found = "has no principal axis along the axis of the drive"
+            yield f"member.{driven}.axis", found, "give the axis of the drive"
         if self.loaded and self.loaded not in self.member:
-            yield f"loaded = {self.loaded!r} is no member that moves freely", f"write one of {', '.join(self.member)}"
+            yield "loaded", f"{self.loaded!r} is no member that moves freely", f"write one of {', '.join(self.member)}"
 
     @property
     def turns_alone(self) -> bool:
@@ -176,12 +175,7 @@ class Linkage(Strict):
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Linkage:
         """Linkage from its values in SI units, as result files hold them."""
-        made = {
-            "member": {name: MemberOf.model_construct(**each) for name, each in values["member"].items()},
-            "pair": {name: PairOf.model_construct(**each) for name, each in values["pair"].items()},
-            "drive": Drive.model_construct(**values["drive"]),
-        }
-        return cls.model_construct(**{**values, **made})
+        return cls.model_validate(values, context={"si": True})
 
     @property
     def in_words(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -29,47 +30,49 @@ from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 
 LINKAGE = "linkage"
-"""Name of all mechanisms that a file describes."""
+"""Name of all mechanisms that a file describes, with those of `PARTS` that the joint gives them after it."""
+PARTS = ("thrust", "friction")
+"""What a linkage may have beside: thrust faces, friction of pins."""
 STIFF = 1e9
 """Torsional stiffness by which the turn of a driven member is given that has pairs in the ground, N m/rad."""
 
 
 @lru_cache(maxsize=64)
-def _mechanism(text: str, faces: bool, friction: bool) -> Mechanism:
+def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
     linkage = Linkage.model_validate_json(text)
     chain, driven, pairs = linkage.chain, linkage.drive.member, linkage.pair
     own = {name: name if name in linkage.member else _shaft(name) for name in (GROUND, *chain.members)}
     turning = SERIES if linkage.drive.swing else DRIVEN
     motions = {name: turning if name == driven else SERIES for name in chain.members}
     return Mechanism(
-        LINKAGE,
+        "+".join((LINKAGE, *parts)),
         members=(
             Member(GROUND, HELD),
             *(Member(name, motions[name], parent=of.parent) for name, of in chain.members.items()),
         ),
         lumps=(
-            *(Lump(f"{name}.pin", pair.pin, f"{name}.pin", OBLIQUE) for name, pair in pairs.items()),
-            *(Lump(f"{name}.eye", pair.eye, f"{name}.eye", OBLIQUE) for name, pair in pairs.items()),
+            *(Lump(f"{name}_pin", pair.pin, f"{name}_pin", OBLIQUE) for name, pair in pairs.items()),
+            *(Lump(f"{name}_eye", pair.eye, f"{name}_eye", OBLIQUE) for name, pair in pairs.items()),
             *(Lump(name, name, name, OBLIQUE) for name in linkage.member),
         ),
         shafts=(Shaft(_shaft(GROUND), GROUND), Shaft(_shaft(driven), driven, driven=True)),
         bushings=(
             *(
-                Bushing(f"{name}.{side}", f"{name}.{side}", own[member], f"{name}.{side}", side)
+                Bushing(f"{name}_{side}", f"{name}_{side}", own[member], f"{name}_{side}", side)
                 for name, pair in pairs.items()
                 for side, member in (("pin", pair.pin), ("eye", pair.eye))
             ),
-            *[Bushing(f"{driven}.drive", driven, _shaft(driven), "drive", "drive")] * linkage.turns_alone,
+            *[Bushing(f"{driven}_drive", driven, _shaft(driven), "drive", "drive")] * linkage.turns_alone,
         ),
         hinges=tuple(Hinge(name, pair.pin, pair.eye, GENERAL) for name, pair in pairs.items()),
-        pairs=tuple(Pair(f"{name}.pin", f"{name}.eye", name) for name in pairs),
+        pairs=tuple(Pair(f"{name}_pin", f"{name}_eye", name) for name in pairs),
         faces=tuple(
-            Face(f"{name}.{word}", f"{name}.pin", end)
+            Face(f"{name}_{word}", f"{name}_pin", end)
             for name, pair in pairs.items()
             for word, end in (("outer", 1), ("inner", -1))
-            if faces and end in ENDS[pair.faces]
+            if "thrust" in parts and end in ENDS[pair.faces]
         ),
-        friction=friction,
+        friction="friction" in parts,
         waves=len(chain.members[driven].wave) if SERIES in motions.values() else 0,
         loaded=linkage.loaded,
     )
@@ -80,9 +83,14 @@ def _shaft(member: str) -> str:
     return f"shaft of {member}"
 
 
-def linkage_mechanism(linkage: Linkage, joint: Joint) -> Mechanism:
-    """Mechanism of a linkage whose pins and eyes are those of a joint."""
-    return _mechanism(linkage.model_dump_json(), joint.thrust is not None, joint.friction.mu is not None)
+def linkage_mechanism(linkage: Linkage, parts: Collection[str]) -> Mechanism:
+    """Mechanism of a linkage whose pins and eyes are those of a joint with these parts; other than `PARTS` play none."""
+    return _mechanism(linkage.model_dump_json(), tuple(part for part in PARTS if part in parts))
+
+
+def named(name: str, linkage: Mapping[str, Any]) -> Mechanism:
+    """Mechanism of a result file by its name, and the values of the linkage that the file holds."""
+    return linkage_mechanism(Linkage.of(linkage), name.split("+")[1:])
 
 
 def frames(chain: Chain) -> dict[str, tuple[Array, Array]]:
@@ -134,18 +142,16 @@ def added_clearances(linkage: Linkage, joint: Joint) -> list[float]:
 
 def _lumps(linkage: Linkage, mechanism: Mechanism) -> tuple[dict[str, Array], dict[str, Array]]:
     """Triad, rows in axes of its member, and reference point in its member (m), of each lump by name."""
-    at, triads, points = frames(linkage.chain), {}, {}
+    at, found = frames(linkage.chain), {}
+    for name, pair in linkage.pair.items():
+        of_pin, of_eye = triad(unit(pair.axis), pair.t), triad(unit(pair.axis), pair.eye_t or pair.t)
+        found[f"{name}_pin"], found[f"{name}_eye"] = (of_pin, pair.point), (of_eye, pair.point)
+    found |= {name: (triad(unit(member.axis)), member.centre) for name, member in linkage.member.items()}
+    triads, points = {}, {}
     for lump in mechanism.lumps:
         axes, origin = at[lump.member]
-        name, _, side = lump.name.rpartition(".")
-        if side in ("pin", "eye"):
-            pair = linkage.pair[name]
-            t = pair.eye_t if side == "eye" and pair.eye_t else pair.t
-            own, point = triad(unit(pair.axis), t), np.array(pair.point)
-        else:
-            member = linkage.member[lump.name]
-            own, point = triad(unit(member.axis)), np.array(member.centre)
-        triads[lump.name], points[lump.name] = own @ axes, axes.T @ (point - origin)
+        own, point = found[lump.name]
+        triads[lump.name], points[lump.name] = own @ axes, axes.T @ (np.array(point) - origin)
     return triads, points
 
 
@@ -153,7 +159,7 @@ def _body(linkage: Linkage, joint: Joint, name: str) -> tuple[float, tuple[float
     """Mass and moments of inertia of a lump."""
     if name in linkage.member:
         return linkage.member[name].mass, linkage.member[name].inertia
-    of = joint.pin if name.endswith(".pin") else joint.arm
+    of = joint.pin if name.endswith("_pin") else joint.arm
     return of.mass, of.inertia
 
 

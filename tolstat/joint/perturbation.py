@@ -93,8 +93,8 @@ class OperationOfShaft(Operation):
 class OperationOfLinkage(Operation):
     """Operating point of a linkage: speed of its drive, in periods of a swing that turns to and fro, and torque."""
 
-    alpha: units.Angle = Field(default=0.0, exclude=True)
-    """has no effect"""
+    alpha: float = Field(default=0.0, exclude=True)
+    axial_force: float = Field(default=0.0, exclude=True)
     torque: units.Torque = Field(default=0.0, examples=["100 N*m"])
     """torque on the member that is `loaded`, against its axis"""
     linkage: Linkage
@@ -115,7 +115,7 @@ SPLINE = "shaft.spline"
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
     """What is simulated: a joint, a drive shaft or a linkage, with the parts that the joint has."""
     if isinstance(operation, OperationOfLinkage):
-        return linkage_mechanism(operation.linkage, joint)
+        return linkage_mechanism(operation.linkage, joint.parts)
     shaft = _shaft_of(operation)
     base = CARDAN if shaft is None else shaft.mechanism
     return MECHANISMS[named(base, joint.parts if shaft is None else (*joint.parts, *shaft.parts))]

@@ -15,7 +15,6 @@ import numpy as np
 from h5py import h5d, h5p
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import MECHANISMS
 from tolstat.common.channels import LoadHistory, components, followed, load_histories
 from tolstat.common.columns import DESIGN_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, error_columns, kept_columns
 from tolstat.common.fields import HistorySpec
@@ -91,7 +90,7 @@ def is_at_point(path: str) -> bool:
 
 def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
     """Columns of each group that a file has, by group."""
-    mechanism = MECHANISMS[metadata.mechanism]
+    mechanism = metadata.simulated
     groups = {"errors": error_columns(mechanism)}
     if metadata.design.variants:
         groups["design"] = DESIGN_COLUMNS
@@ -169,7 +168,7 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
             histories = _linked(holder, "histories")
             for name, spec in metadata.histories.items():
                 dataset = _create(histories, name, (n, *spec.shape), spec, row, MEANINGS)
-                attach_scales(dataset, spec, MECHANISMS[metadata.mechanism])
+                attach_scales(dataset, spec, metadata.simulated)
     session = file.create_group("session")
     for name, (dtype, unit, description) in SESSION.items():
         blank = np.nan if dtype == "f8" else int(name == "number")

@@ -20,8 +20,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 import tolstat
+from tolstat.common.cardan import MECHANISMS
+from tolstat.common.errors import input_error
 from tolstat.common.fields import HistorySpec
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Variant, to_names
+from tolstat.joint import linked
 from tolstat.store.hdf5 import put_attributes, text
 from tolstat.study import Study
 
@@ -44,7 +48,7 @@ class Metadata(BaseModel):
     study_name, study : str
         Name of the study, and the TOML that it was read from.
     mechanism : str
-        Name of the mechanism, see `cardan.MECHANISMS`.
+        Name of the mechanism, see `simulated`.
     limits : dict of str to float
         Limit of each load, SI.
     points : dict of str to dict
@@ -91,6 +95,23 @@ class Metadata(BaseModel):
     n: int
     created: str
     git_commit: str
+
+    @property
+    def simulated(self) -> Mechanism:
+        """The mechanism by its name, one of `cardan.MECHANISMS`, or a linkage of its operating points.
+
+        Raises
+        ------
+        InputError
+            When there is no such mechanism.
+        """
+        linkage = next(iter(self.points.values())).get("linkage") if self.points else None
+        if linkage:
+            return linked.named(self.mechanism, linkage)
+        if self.mechanism not in MECHANISMS:
+            found = f"is {self.mechanism!r}, which this tolstat does not know"
+            raise input_error("mechanism", found, "use a newer tolstat")
+        return MECHANISMS[self.mechanism]
 
 
 def of_study(

@@ -17,7 +17,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.cardan import MECHANISMS
 from tolstat.common.columns import DESIGN_COLUMNS, SUBSET, Column, drawn_columns, error_columns, kept_columns
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
@@ -98,10 +97,7 @@ class Reader:
 
     def _describe(self, document: metadata.Metadata) -> None:
         self.metadata = document
-        if document.mechanism not in MECHANISMS:
-            found = f"has mechanism {document.mechanism!r}, which this tolstat does not know"
-            raise store_error(self.path, found, "use a newer tolstat")
-        self.mechanism = MECHANISMS[document.mechanism]
+        self.mechanism = document.simulated
         self.study_name, self.study_text = document.study_name, document.study
         self.joint, self.limits = document.joint, document.limits
         self.identity, self.options, self.fidelity = document.identity, document.options, document.fidelity

@@ -254,7 +254,7 @@ def _fast_points(study: Study) -> Iterator[Fault]:
     """Warn once of operating points whose speed is far beyond that of any joint shaft at their misalignment."""
     fast = []
     for number, point in enumerate(study.points):
-        rpm, alpha = point.operation.speed * 30.0 / math.pi, math.degrees(max(point.operation.alphas))
+        rpm, alpha = point.operation.speed * 30.0 / math.pi, math.degrees(max(point.operation.alphas, default=0.0))
         product = abs(rpm) * alpha
         if product > FAST * (1.0 + ROUNDING):
             at = f" at {point.name}" if point.name else ""

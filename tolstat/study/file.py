@@ -21,7 +21,7 @@ from tolstat.joint import SPLINE, DriveShaft, Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
-from tolstat.study import fatigue, listing, points, rewriting, selection
+from tolstat.study import fatigue, linkages, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.points import Point
@@ -30,7 +30,7 @@ from tolstat.study.study import Study
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
-OF_CASE = ("joint", "operation", "shaft", "solver", "errors", "limits")
+OF_CASE = ("joint", "operation", "shaft", "mechanism", "solver", "errors", "limits")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
@@ -144,6 +144,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "fit": fits.read,
     "joint": _joint,
     "assumed": _assumed,
+    "linkage": linkages.read,
     "shaft": lambda file: file.model(DriveShaft, file.data["shaft"], "shaft") if "shaft" in file.data else None,
     "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
@@ -279,7 +280,7 @@ def load(
     whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
-        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "shaft")}
+        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "shaft", "linkage")}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
         study = Study(file.path, file.text, **parts)
         with gather(file.faults):
@@ -310,7 +311,7 @@ def load_case(path: str | Path) -> Study:
             f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"
         )
         raise input_error(file.place, "is a study, not a case of one joint", remedy)
-    _read(file, ["joint", "shaft"])
+    _read(file, ["joint", "linkage", "shaft"])
     file.parts["points"] = ()
     with gather(file.faults):
         file.parts["points"] = (Point("", points.operation(file), 1.0),)

@@ -20,12 +20,23 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
+from tolstat.joint import (
+    SPLINE,
+    DriveShaft,
+    Joint,
+    Linkage,
+    Operation,
+    OperationOfLinkage,
+    OperationOfShaft,
+    mechanism_of,
+    orders,
+)
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.perturbation import unbalances
 from tolstat.joint.sections import FREE, RIGID
 from tolstat.joint.shaft import check_misalignment
 from tolstat.study.axes import columns_of
+from tolstat.study.linkages import DrivenPoint
 from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
@@ -54,11 +65,13 @@ class Point(NamedTuple):
     def in_words(self) -> str:
         """``"10 deg, 500 rpm, 100 N m"``; an axial force; of several points the share of the time if it is given."""
         at = self.operation
-        words = f"{math.degrees(at.alpha):.4g} deg, {at.speed * 30 / math.pi:.4g} rpm, {at.torque:.4g} N m"
+        words = "" if isinstance(at, OperationOfLinkage) else f"{math.degrees(at.alpha):.4g} deg, "
+        words += f"{at.speed * 30 / math.pi:.4g} rpm, {at.torque:.4g} N m"
         words += f", axial force {at.axial_force:.4g} N" if at.axial_force else ""
         for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
             words += f", {orders.in_words(given)} of {name}" if given else ""
         words += f", {at.shaft.in_words}" if isinstance(at, OperationOfShaft) else ""
+        words += f", {at.linkage.in_words}" if isinstance(at, OperationOfLinkage) else ""
         return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
     @classmethod
@@ -71,6 +84,8 @@ class Point(NamedTuple):
         kind: type[Operation] = OperationOfShaft if "shaft" in keys else Operation
         if "shaft" in keys:
             keys["shaft"] = DriveShaft.of(keys["shaft"])
+        if "linkage" in keys:
+            kind, keys["linkage"] = OperationOfLinkage, Linkage.of(keys["linkage"])
         return cls(name, kind.model_construct(None, **keys), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
@@ -113,12 +128,14 @@ def read(file: Reading) -> tuple[Point, ...]:
         return tuple(points)
     for number, item in enumerate(section):
         with gather(file.faults):
-            entry = file.model(PointEntry, item, "operation", number)
+            entry = file.model(PointEntry if file.linkage is None else DrivenPoint, item, "operation", number)
+            check_name(entry.name or "")
             if entry.name in [point.name for point in points]:
                 found = f"a point {entry.name!r} exists already"
                 file.fault(f"operation[{number}].name", found, "give each point its own name")
-            of_point = _of_mechanism(file, entry, entry.alpha2)
-            if entry.alpha2 is not None and file.data.get("shaft") is None:
+            second = getattr(entry, "alpha2", None)
+            of_point = _of_mechanism(file, entry, second)
+            if second is not None and file.data.get("shaft") is None:
                 file.fault(
                     f"operation[{number}].alpha2", "has no effect: there is one joint", "add [shaft], or remove it"
                 )
@@ -140,11 +157,15 @@ def operation(file: Reading) -> Operation:
     """
     if "operation" not in file.data:
         raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
-    return _of_mechanism(file, file.model(Operation, file.data["operation"], "operation"))
+    model = Operation if file.linkage is None else DrivenPoint
+    return _of_mechanism(file, file.model(model, file.data["operation"], "operation"))
 
 
-def _of_mechanism(file: Reading, read: Operation, second: float | None = None) -> Operation:
-    """Operating point with joint 2 of ``[shaft]``, if the file has one, with its misalignment at this point."""
+def _of_mechanism(file: Reading, read: Operation | DrivenPoint, second: float | None = None) -> Operation:
+    """Operating point of the mechanism of the file; of ``[shaft]`` with joint 2 and its misalignment at this point."""
+    if isinstance(read, DrivenPoint):
+        own = {key: getattr(read, key) for key in ("speed", "torque", *ORDERS)}
+        return OperationOfLinkage.model_construct(None, **own, linkage=file.linkage)
     values = {key: getattr(read, key) for key in Operation.model_fields}
     if file.shaft is None:
         return Operation.model_construct(**values)
@@ -274,12 +295,16 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
         yield NO_CLOSED_FORM
     if any(setting.joint.friction.mu is not None for setting in every):
         yield "'ideal' does not hold with friction, which its closed forms leave out", remedy
+    if any(isinstance(setting.operation, OperationOfLinkage) for setting in every):
+        yield "'ideal' does not hold for a linkage: its closed forms are those of one joint", remedy
     if any(isinstance(setting.operation, OperationOfShaft) for setting in every):
         yield "'ideal' does not hold for a drive shaft: its closed forms are those of one joint", remedy
 
 
 def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
+    if any(isinstance(setting.operation, OperationOfLinkage) for setting in settings):
+        return
     if not any(setting.joint.shaft.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
         own = [setting.joint for setting in settings if not isinstance(setting.operation, OperationOfShaft)]

@@ -20,6 +20,7 @@ from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
 from tolstat.common.tables import tables
 from tolstat.common.units import to_si
+from tolstat.joint.linked import linkage_mechanism
 from tolstat.joint.model import giving
 from tolstat.joint.reading import is_joint
 from tolstat.joint.shaft import by_keys
@@ -298,8 +299,10 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint = self.parts.get("joint")
-        return by_keys(self.data.get("shaft"), joint.parts if joint else PARTS)
+        parts = self.joint.parts if self.joint else PARTS
+        if self.linkage:
+            return linkage_mechanism(self.linkage, parts)
+        return by_keys(self.data.get("shaft"), parts)
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

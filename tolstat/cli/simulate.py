@@ -68,7 +68,7 @@ def simulate(
         for note in notes:
             say(note)
     print_warnings(case, [loaded.joint])
-    say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
+    say(f"{loaded.name}: {loaded.joint_in_words}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
     joints = answered(library.parts.of_case(loaded, result))

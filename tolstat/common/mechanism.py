@@ -86,6 +86,8 @@ class Shaft(NamedTuple):
         Whether the torque about it is a load: it drives what is behind it.
     borne : bool
         Whether the loads of its two bearings are loads.
+    carries : bool
+        Whether what it carries is a load: not of the ground, on which many parts stand.
     """
 
     name: str
@@ -95,6 +97,7 @@ class Shaft(NamedTuple):
     across: tuple[str, ...] = ()
     driven: bool = False
     borne: bool = False
+    carries: bool = True
 
 
 class Bushing(NamedTuple):
@@ -254,9 +257,8 @@ def features(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def carried(mechanism: Mechanism) -> list[int]:
-    """Numbers of the shafts whose loads are loads of the mechanism: those that move."""
-    held = {member.name for member in mechanism.members if member.motion == HELD}
-    return [i for i, shaft in enumerate(mechanism.shafts) if shaft.member not in held]
+    """Numbers of the shafts that carry loads of the mechanism."""
+    return [i for i, shaft in enumerate(mechanism.shafts) if shaft.carries]
 
 
 @cache

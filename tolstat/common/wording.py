@@ -22,6 +22,8 @@ _ROW = r"""(?<! [\w./\\*\[\]"'`=-] ) (?P<first>[Jj])oint(?P<several>s?) (?! [\w\
 
 def row_of(mechanism: Mechanism) -> str:
     """What a row of a mechanism's tables is called."""
+    if not mechanism.cardan:
+        return "mechanism"
     return "shaft" if mechanism.is_shaft else "joint"
 
 

@@ -91,6 +91,11 @@ class Chain(NamedTuple):
     gap: float
     size: float
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Smallest and largest angle of each member in the one before it over a period, rad."""
+        angles = angles_at(self.members, 2.0 * math.pi * np.arange(CHECKED + 1) / CHECKED)
+        return {name: (float(of.min()), float(of.max())) for name, of in zip(self.members, angles.T, strict=True)}
+
 
 class _Loops(NamedTuple):
     """The equations: members with their parent and pair, the angle of the first of which is given; closing pairs."""

@@ -41,7 +41,7 @@ STIFF = 1e9
 def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
     linkage = Linkage.model_validate_json(text)
     chain, driven, pairs = linkage.chain, linkage.drive.member, linkage.pair
-    own = {name: name if name in linkage.member else _shaft(name) for name in (GROUND, *chain.members)}
+    held = f"{driven}_drive" if linkage.turns_alone else driven
     turning = SERIES if linkage.drive.swing else DRIVEN
     motions = {name: turning if name == driven else SERIES for name in chain.members}
     return Mechanism(
@@ -55,14 +55,17 @@ def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
             *(Lump(f"{name}_eye", pair.eye, f"{name}_eye", OBLIQUE) for name, pair in pairs.items()),
             *(Lump(name, name, name, OBLIQUE) for name in linkage.member),
         ),
-        shafts=(Shaft(_shaft(GROUND), GROUND), Shaft(_shaft(driven), driven, driven=True)),
+        shafts=(
+            Shaft(GROUND, GROUND, carries=False),
+            Shaft(held, driven, driven=not linkage.turns_alone, carries=not linkage.turns_alone),
+        ),
         bushings=(
             *(
-                Bushing(f"{name}_{side}", f"{name}_{side}", own[member], f"{name}_{side}", side)
+                Bushing(f"{name}_{side}", f"{name}_{side}", member, f"{name}_{side}", side)
                 for name, pair in pairs.items()
                 for side, member in (("pin", pair.pin), ("eye", pair.eye))
             ),
-            *[Bushing(f"{driven}_drive", driven, _shaft(driven), "drive", "drive")] * linkage.turns_alone,
+            *[Bushing(held, driven, held, "drive", "drive")] * linkage.turns_alone,
         ),
         hinges=tuple(Hinge(name, pair.pin, pair.eye, GENERAL) for name, pair in pairs.items()),
         pairs=tuple(Pair(f"{name}_pin", f"{name}_eye", name) for name in pairs),
@@ -76,11 +79,6 @@ def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
         waves=len(chain.members[driven].wave) if SERIES in motions.values() else 0,
         loaded=linkage.loaded,
     )
-
-
-def _shaft(member: str) -> str:
-    """Name of what prescribes a member."""
-    return f"shaft of {member}"
 
 
 def linkage_mechanism(linkage: Linkage, parts: Collection[str]) -> Mechanism:

@@ -15,7 +15,6 @@ from tolstat.common.files import check_target
 from tolstat.common.tables import Status
 from tolstat.display import rewording, text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
-from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, capability, shares
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
@@ -48,7 +47,7 @@ def report(view: View, accepted: float = math.nan) -> Answer:
 
 def _answer(view: View, accepted: float) -> Answer:
     store = view.store
-    stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
+    stands_on = [Sentence(text.sentence(recorded.in_words(store)), "lead")]
     if store.case_names or view.method == "sweep":
         answer = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
@@ -210,7 +209,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     }
     answers = questions.statistics(view)
     stands_on: dict[str, Any] = {
-        "joint": mounting_and_law(*recorded.mountings(store)),
+        "joint": recorded.in_words(store),
         "fidelity": fidelity.sentence(store.options, store.fidelity),
     }
     head, stands_on = (rewording.values(each, recorded.wording_of(store)) for each in (head, stands_on))

@@ -22,7 +22,7 @@ from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.model import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
-from tolstat.joint.sections import mounting_and_law, quantities
+from tolstat.joint.sections import quantities
 from tolstat.questions import QUESTIONS, accuracy, shares
 from tolstat.questions.assumptions import answer, sentences, variations
 from tolstat.questions.causes import lines, revolution
@@ -192,10 +192,10 @@ def scene(view: View) -> tuple[str, str]:
     """
     points = [view.store.points[name] for name in view.points]
     at = points[0].in_words if len(points) == 1 else f"{len(points)} operating points"
-    axial, laws = recorded.mountings(view.store)
+    _, laws = recorded.mountings(view.store)
     bearing = "bearings" if len({law == "needles" for law in laws}) > 1 else "plain bearings"
     bearing = "needle bearings" if set(laws) == {"needles"} else bearing
-    mounting, law = mounting_and_law(axial, laws).split("; ")
+    mounting, law = recorded.in_words(view.store).split("; ")
     assumed: set[str] | None = None  # where the study can no longer be read
     with suppress(TolstatError):
         assumed = {key for assumption in assumptions(view.study) for value in assumption.values for key in value}

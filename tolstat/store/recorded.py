@@ -15,10 +15,10 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
-from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
+from tolstat.joint import MEANS, SPLINE, Joint, Operation, OperationOfLinkage, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
-from tolstat.joint.sections import RIGID
+from tolstat.joint.sections import RIGID, mounting_and_law
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.reader import Reader
@@ -106,6 +106,15 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
         name: np.array([np.nan if isinstance(value, str) else value for value in of_variants], float)[number]
         for name, of_variants in values.items()
     }
+
+
+def in_words(store: Reader) -> str:
+    """What is simulated and by which contact law, see `mounting_and_law`; raises as `mountings`."""
+    axial, laws = mountings(store)
+    operation = next(iter(store.points.values())).operation
+    if isinstance(operation, OperationOfLinkage):
+        return f"{operation.linkage.in_words}{mounting_and_law([], laws)}"
+    return mounting_and_law(axial, laws)
 
 
 def mountings(store: Reader) -> tuple[list[float | str], list[str]]:

@@ -395,7 +395,7 @@ def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], mech
         Empty where a shaft may move or a spline gives way, or no error along the shafts scatters.
     """
     along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
-    if not along or mechanism.spline or any(value != RIGID for value in axial):
+    if not along or not mechanism.cardan or mechanism.spline or any(value != RIGID for value in axial):
         return ""
     return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "

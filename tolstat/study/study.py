@@ -21,7 +21,7 @@ from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.toml_lines import KeyPath
 from tolstat.common.wording import Wording, row_of
-from tolstat.joint import SPLINE, Joint, Operation, affecting_results, mechanism_of
+from tolstat.joint import SPLINE, Joint, Operation, OperationOfLinkage, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
 from tolstat.study import points
@@ -193,7 +193,10 @@ class Study:
     @property
     def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
-        return mounting_and_law([j.shaft.axial for j in self.joints], [j.contact.law for j in self.joints])
+        laws = [joint.contact.law for joint in self.joints]
+        if isinstance(self.operation, OperationOfLinkage):
+            return f"{self.operation.linkage.in_words}{mounting_and_law([], laws)}"
+        return mounting_and_law([joint.shaft.axial for joint in self.joints], laws)
 
     @property
     def _settings(self) -> list[Setting]:

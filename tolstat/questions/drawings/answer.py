@@ -75,10 +75,22 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
                 which = f"{'most often above' if sample.above(sample.limit).count else 'nearest to'} its limit"
             title = f"{place.name or load}: {which}"
             title += f", at {view.point_of(load)}" if len(view.points) > 1 else ""
+        if not view.mechanism.cardan:
+            panel = _linkage(recorded.joint_of(view.store, 0), view.at(view.points[0]).store.operation, names)
+            return replace(panel, key="joint-worst", title=f"{panel.title}; {title}" if load else panel.title)
         drawn = _joints(view, names, load)
         before = next((before for before in drawn if names[0].startswith(before)), next(iter(drawn)))
         return replace(drawn[before][side], key="joint-worst", title=title)
     return None
+
+
+def _linkage(joint: joints.Joint, operation: joints.Operation, marked: Collection[str] = ()) -> Panel:
+    """Three views of a linkage without errors; bushings, pins and members in `marked` stand out."""
+    from tolstat.questions.drawings import plain
+
+    mechanism = joints.mechanism_of(joint, operation)
+    row = joints.perturb(joint, operation, joints.nominal_errors(1, mechanism)).view(np.recarray)[0]
+    return plain.views(mechanism, row, plain.frames(mechanism, row), marked)
 
 
 def _joints(view: View, marked: Collection[str], load: str) -> dict[str, tuple[Panel, Panel]]:
@@ -116,6 +128,9 @@ def drawings(view: View) -> Answer:
         whole; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
+    if not view.mechanism.cardan:
+        panel = _linkage(recorded.joint_of(view.store, 0), view.at(view.points[0]).store.operation, marked)
+        return Answer("drawings", "The mechanism, drawn", [Panels([panel]), Sentence(PLAIN)])
     kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
     drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
     operation = view.at(view.points[0]).store.operation
@@ -250,6 +265,8 @@ def draw_joint(joint: joints.Joint, at: float | joints.Operation, title: str = "
     matplotlib.figure.Figure
         Its parts have their names as ids in an SVG.
     """
+    if isinstance(at, joints.OperationOfLinkage):
+        return drawing.sheet([_linkage(joint, at)], title or at.linkage.description, [PLAIN])
     if isinstance(at, joints.OperationOfShaft):
         each = [views.views(joint, alpha) for alpha in at.alphas]
         sides = [_named(panels, f"joint{number}.")[1] for number, panels in enumerate(each, 1)]

@@ -9,7 +9,16 @@ import numpy as np
 
 from tolstat.display import text
 from tolstat.display.answer import Rows
-from tolstat.joint import DriveShaft, Joint, OperationOfShaft, mechanism_of, nominal_errors, perturb
+from tolstat.joint import (
+    DriveShaft,
+    Joint,
+    Linkage,
+    OperationOfLinkage,
+    OperationOfShaft,
+    mechanism_of,
+    nominal_errors,
+    perturb,
+)
 from tolstat.joint.ideal import ratio_of_all
 from tolstat.study.points import Point
 
@@ -29,6 +38,9 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
     points : sequence of Point
         Its operating points.
     """
+    if isinstance(points[0].operation, OperationOfLinkage):
+        lines = [*_of_linkage(points[0].operation.linkage), *_of_pins(joint), *_of_points(points), *_of_parts(joint)]
+        return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in lines]
     lines = [*_of_joint(joint), *_of_points(points), *_of_parts(joint)]
     shafts = [point.operation for point in points if isinstance(point.operation, OperationOfShaft)]
     if shafts:
@@ -47,11 +59,17 @@ def second_order(joint: Joint, operation: OperationOfShaft) -> float:
 
 
 def _of_joint(joint: Joint) -> list[Line]:
-    arm, contact = joint.arm, joint.contact
     rows = [
         ("cross.R", joint.cross.R, "centre of the joint to the middle of pin and hole"),
         ("cross.r_b", joint.cross.r_b, "centre of the joint to a cross bushing"),
-        ("arm.l_f", arm.l_f, "middle of a hole to a fork bushing, along the shaft"),
+        ("arm.l_f", joint.arm.l_f, "middle of a hole to a fork bushing, along the shaft"),
+    ]
+    return [*((name, _mm(x), meaning) for name, x, meaning in rows), *_of_pins(joint)]
+
+
+def _of_pins(joint: Joint) -> list[Line]:
+    arm, contact = joint.arm, joint.contact
+    rows = [
         ("contact.D_P", contact.D_P, "diameter of the pins"),
         ("contact.D_H", contact.D_H, "diameter of the holes"),
         ("clearance", 0.5 * (contact.D_H - contact.D_P), "radial clearance"),
@@ -65,13 +83,30 @@ def _of_joint(joint: Joint) -> list[Line]:
     return [(name, _mm(x), meaning) for name, x, meaning in rows if x is not None]
 
 
+def _of_linkage(linkage: Linkage) -> Iterator[Line]:
+    chain, drive = linkage.chain, linkage.drive
+    yield "mechanism", f"{len(chain.members) + 1} members, {len(linkage.pair)} pairs", "the ground is a member"
+    yield "mobility", f"{chain.mobility}", "ways in which it moves without errors and clearance"
+    yield "redundant constraints", f"{chain.redundant}", "beyond those that this mobility leaves room for, eq. (1)"
+    yield "largest gap", f"{1e6 * chain.gap:.2g} um", "of a loop at 1000 angles of its ideal motion"
+    swings = "" if drive.swing is None else f" from {_deg(drive.swing[0])} to {_deg(drive.swing[1])}"
+    yield "drive", f"{drive.member}{swings}", "driven member; the angle zero is the one of the file"
+    if linkage.loaded:
+        yield "loaded", linkage.loaded, "member that operation.torque acts on"
+    for name, (low, high) in chain.ranges().items():
+        yield name, f"{_deg(low)} to {_deg(high)}", "angle in the member before it, in a period"
+
+
 def _of_points(points: Sequence[Point]) -> Iterator[Line]:
     """Lines of operating points: of one without a name its misalignment, as a joint file has no more."""
     of_joints = (
         ("of joint 1", "of joint 2") if isinstance(points[0].operation, OperationOfShaft) else ("of the shafts",)
     )
     for name, operation, share in points:
-        if name:
+        if isinstance(operation, OperationOfLinkage):
+            motion = f"{operation.speed * 30 / np.pi:.5g} rpm, {operation.torque:.5g} N m"
+            yield f"operation.{name}".rstrip("."), motion, "speed of the drive, torque on the loaded member"
+        elif name:
             alphas = " and ".join(map(_deg, operation.alphas))
             motion = f"{alphas}, {operation.speed * 30 / np.pi:.5g} rpm, {operation.torque:.5g} N m"
             time = "" if isnan(share) else f"; {text.percent(share)} of the time"

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.common.mechanism import Mechanism
+from tolstat.common.mechanism import Mechanism, carried
 from tolstat.display.answer import Axes, Panel
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, DASHES, INK
@@ -126,11 +126,12 @@ def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
     at = {body: np.zeros(3) for body in member}
     for i, lump in enumerate(mechanism.lumps):
         at[lump.name] += from_triad(i, tuple(row.at[row.lump_kind[i]]), row)
+    still = {shaft.name for shaft in mechanism.shafts if not shaft.carries}
     drawn: list[tuple[str, str, list[Array], Look]] = []
-    feet = {shaft.name: list[float]() for shaft in mechanism.shafts}
+    feet = {mechanism.shafts[i].name: list[float]() for i in carried(mechanism)}
     for i, bushing in enumerate(mechanism.bushings):
         marker = at[bushing.base] + markers(i, row)[1]
-        end = at[bushing.base]
+        end = marker if bushing.base in still else at[bushing.base]
         if bushing.base in feet:
             end = marker * (0.0, 0.0, 1.0)
             feet[bushing.base].append(marker[2])

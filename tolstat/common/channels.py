@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import Kind, kinds, places
+from tolstat.common.load_kinds import Kind, all_kinds, kinds, places
 from tolstat.common.mechanism import Mechanism
 
 
@@ -59,7 +59,7 @@ BUSHING_LOADS, SHAFT_LOADS = "loads", "shafts"
 @cache
 def load_histories(mechanism: Mechanism) -> dict[str, LoadHistory]:
     """What histories hold of the loads of a mechanism, by name."""
-    bushings, shafts = kinds(mechanism)["F"].places, kinds(mechanism)["axial"].places
+    bushings, shafts = all_kinds(mechanism)["F"].places, all_kinds(mechanism)["axial"].places
     of_bushings, of_shafts = _in_words(bushings), " and ".join(shafts)
     found = (
         LoadHistory(

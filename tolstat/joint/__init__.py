@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tolstat.joint.perturbation import SPLINE as SPLINE
     from tolstat.joint.perturbation import Operation as Operation
     from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
+    from tolstat.joint.perturbation import joints_of as joints_of
     from tolstat.joint.perturbation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
@@ -30,7 +31,7 @@ _HOMES = {
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": (
         *("MEANS", "SPLINE", "Operation", "OperationOfShaft"),
-        *("mechanism_of", "nominal_errors", "operating", "perturb"),
+        *("joints_of", "mechanism_of", "nominal_errors", "operating", "perturb"),
     ),
     "reading": ("load", "varied"),
     "shaft": ("DriveShaft",),

@@ -46,6 +46,11 @@ def joint_of(store: Reader, row: int) -> Joint:
     return varied(nominal, _values(store, row))
 
 
+def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:
+    """Joints that are simulated together in file slot `row`: one, or both of a drive shaft."""
+    return joints_of(joint_of(store, row), operation_of(store, row))
+
+
 def operation_of(store: Reader, row: int) -> Operation:
     """Operating point of file slot `row`: that of the store, or of the slot's variant; see `joint.operating`."""
     values = {key.removeprefix("operation."): value for key, value in _values(store, row).items() if key in _OPERATION}
@@ -58,7 +63,7 @@ def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDA
     errors = store.errors(slots, (*_OPERATION, SPLINE) if sticks else _OPERATION)
 
     def at(row: int, errors: NDArray[np.void]) -> dict[str, NDArray[np.float64]]:
-        return operating(operation_of(store, row), errors, joint_of(store, row).shaft.spline if sticks else None)
+        return operating(operation_of(store, row), errors, joints_at(store, row)[-1].shaft.spline if sticks else None)
 
     if not store.variants:
         return at(0, errors)
@@ -119,8 +124,10 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
     numbers = np.unique(store.design()["variant"]) if store.variants else ()
     changed = [store.variants[number].values for number in numbers] or [{}]
-    axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed]
-    return axial, [values.get("contact.law", nominal.contact.law) for values in changed]
+    laws = [values.get("contact.law", nominal.contact.law) for values in changed]
+    if joint2 := store.operation.joint2:
+        return [joint2.shaft.axial], [*laws, joint2.contact.law]
+    return [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed], laws
 
 
 def note_on_mounting(store: Reader) -> str:
@@ -194,8 +201,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
+    joint2 = None if path is not None else store.operation.joint2
     try:
-        study = load(source, n=joints, text=text, joint=joint)
+        study = load(source, n=joints, text=text, joint=joint, joint2=joint2)
     except InputError as error:
         if path is not None:
             raise
@@ -211,7 +219,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise store_error(store.path, found, "give the study file of the campaign: --study STUDY")
     if n is None:
         return study
-    return _at_point(store, load(source, n=n, text=text, joint=joint))
+    return _at_point(store, load(source, n=n, text=text, joint=joint, joint2=joint2))
 
 
 def mentions(store: Reader, keys: Collection[str], section: str) -> bool:

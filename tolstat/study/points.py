@@ -20,10 +20,10 @@ from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, mechanism_of, orders
+from tolstat.joint import SPLINE, DriveShaft, Joint, Operation, OperationOfShaft, joints_of, mechanism_of, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
-from tolstat.joint.perturbation import unbalances
-from tolstat.joint.sections import FREE, RIGID
+from tolstat.joint.perturbation import parts_of, unbalances
+from tolstat.joint.sections import FREE, RIGID, Shaft
 from tolstat.joint.shaft import check_misalignment
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading
@@ -252,7 +252,7 @@ class Setting(NamedTuple):
     path : tuple
         Key path of the operating point in the file.
     joint, operation : Joint, Operation
-        The joint and the point.
+        The joint, of a drive shaft joint 1, and the point.
     fidelity : str
         ``solver.fidelity``.
     """
@@ -262,9 +262,19 @@ class Setting(NamedTuple):
     operation: Operation
     fidelity: str
 
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joint, or both of a drive shaft."""
+        return joints_of(self.joint, self.operation)
+
+    @property
+    def output(self) -> Shaft:
+        """The output shaft, that of the last joint."""
+        return self.joints[-1].shaft
+
     def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and bool({FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0)
+        return self.output.slides and bool({FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0)
 
 
 def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
@@ -272,7 +282,7 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
     every, remedy = list(settings), 'write "quasistatic" or "dynamic"'
     if any(setting.moved(varied) for setting in every):
         yield NO_CLOSED_FORM
-    if any(setting.joint.friction.mu is not None for setting in every):
+    if any(joint.friction.mu is not None for setting in every for joint in setting.joints):
         yield "'ideal' does not hold with friction, which its closed forms leave out", remedy
     if any(isinstance(setting.operation, OperationOfShaft) for setting in every):
         yield "'ideal' does not hold for a drive shaft: its closed forms are those of one joint", remedy
@@ -280,7 +290,7 @@ def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tupl
 
 def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
     """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
-    if not any(setting.joint.shaft.slides for setting in settings):
+    if not any(setting.output.slides for setting in settings):
         paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
         own = [setting.joint for setting in settings if not isinstance(setting.operation, OperationOfShaft)]
         paths += [("joint", "shaft", "spline")] * any(joint.shaft.spline for joint in own)
@@ -313,25 +323,33 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyP
             for section in varied.get(f"operation.{key}_swing", ()):
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     for part in PARTS:
-        if len({part in setting.joint.parts for setting in settings}) > 1:
+        if len({part in parts_of(setting.joint, setting.operation) for setting in settings}) > 1:
             found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
             yield ("joint",), found, "give it to all of them, or to none"
     for body, (unbalance, _) in (found for s in settings for found in unbalances(s.joint, s.operation).items()):
         if unbalance and unbalance.angle is None and not varied.get(f"{body}.unbalance_angle"):
             uniform = '{ plus_minus = "180 deg", distribution = "uniform" }'
-            path, bodies = (("joint", "shaft"), body) if body == "output" else (("shaft", "tube"), "tube*")
+            path, bodies = ((*_last(settings), "shaft"), body) if body == "output" else (("shaft", "tube"), "tube*")
             remedy = f'write "{bodies}.unbalance_angle" = {uniform} under [tolerances], or give its angle'
             yield (*path, "unbalance"), "has no direction", remedy
-    if any(setting.joint.thrust is None for setting in of_shafts):
-        found = "missing: pins that slide freely locate no tube across its axis"
-        yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
-    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
-        yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
-    if any(setting.joint.shaft.spline for setting in of_shafts):
-        remedy = "write shaft.spline, that of the tubes, or remove it"
-        yield ("joint", "shaft", "spline"), "is that of one joint", remedy
+    for k, path in enumerate(dict.fromkeys((("joint",), _last(of_shafts)))):
+        joints = [setting.joints[k] for setting in of_shafts]
+        if any(joint.thrust is None for joint in joints):
+            found = "missing: pins that slide freely locate no tube across its axis"
+            yield (*path, "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
+        if any(joint.shaft.spline for joint in joints):
+            remedy = "write shaft.spline, that of the tubes, or remove it"
+            yield (*path, "shaft", "spline"), "is that of one joint", remedy
+    if any(setting.output.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
+        remedy = 'write axial = "rigid"'
+        yield (*_last(of_shafts), "shaft", "axial"), "is free beside a spline: nothing holds the shaft", remedy
     for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
         yield ("solver", "fidelity"), *texts
+
+
+def _last(settings: Iterable[Setting]) -> tuple[str, ...]:
+    """Key path of the last joint."""
+    return ("shaft", "joint2") if any(setting.operation.joint2 for setting in settings) else ("joint",)
 
 
 def with_free_shaft(study: str, stem: str, joint: Joint) -> str:

@@ -158,7 +158,8 @@ class Study:
 
     def _impossible(self) -> Iterator[tuple[KeyPath, str, str]]:
         """Deviations that take the friction of a joint below zero, and forces above that which a spline can hold."""
-        mu = min((joint.friction.mu for joint in self.joints if joint.friction.mu is not None), default=math.inf)
+        every = (joint for setting in self._settings for joint in setting.joints)
+        mu = min((joint.friction.mu for joint in every if joint.friction.mu is not None), default=math.inf)
         for path, (least, _) in self._given(MU).items():
             if mu + least < 0.0:
                 found = f"takes friction.mu = {mu:g} of the joint down to {mu + least:.3g}, below zero"
@@ -193,7 +194,8 @@ class Study:
     @property
     def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
-        return mounting_and_law([j.shaft.axial for j in self.joints], [j.contact.law for j in self.joints])
+        every = [setting.joints for setting in self._settings]
+        return mounting_and_law([j[-1].shaft.axial for j in every], [joint.contact.law for j in every for joint in j])
 
     @property
     def _settings(self) -> list[Setting]:
@@ -333,6 +335,8 @@ class Study:
         the same rows with the same results.
         """
         points = {point.name: point.operation.model_dump() for point in self.points}
+        for of_shaft in (point["shaft"] for point in points.values() if "shaft" in point):
+            del of_shaft["joint2"]
         parts: dict[str, Any] = {
             "joint": affecting_results(self.joint.given("json")),
             "operation": points.get("", points),
@@ -345,6 +349,7 @@ class Study:
             "output": self.output.identity(self.mechanism),
         }
         optional = {
+            "joint2": affecting_results(self.operation.joint2.given("json")) if self.operation.joint2 else {},
             "axes": {name: axis.describe() for name, axis in self.axes.items()},
             "lots": {name: list(lot) for name, lot in self.lots.items()},
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],

@@ -176,7 +176,8 @@ def after(study: Study, line: Group, step: str) -> Study:
     fit = study.fit._replace(entry=study.fit.entry.model_copy(update={"code": step}))
     diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in fit.diameters.items()}
     # the joint file need not be there any more: the joint in hand has all that it gave
-    return applied(load(study.path, study.sampling.n, text, varied(study.joint, diameters)), {})
+    joints = [varied(joint, diameters) for joint in (study.joint, study.operation.joint2) if joint]
+    return applied(load(study.path, study.sampling.n, text, *joints), {})
 
 
 def changed(study: Study, line: Group, step: str) -> dict[str, Distribution]:

@@ -1,30 +1,27 @@
-"""Operating point, nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
+"""Nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema
 
-from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, named
+from tolstat.common.cardan import ARM_QUARTERS, PIN_QUARTERS
 from tolstat.common.loads import split
 from tolstat.common.mechanism import OBLIQUE, Mechanism, prefixes
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict
 from tolstat.common.tables import FACTORS, blank_params, tables
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Unbalance
-from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
+from tolstat.joint.operation import MEANS, SPLINE, Operation, joints_of, mechanism_of, shaft_of, unbalances
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin
+from tolstat.joint.shaft import DriveShaft, Lumped
 from tolstat.joint.spline import Spline
 
 Table = NDArray[np.void]
@@ -43,97 +40,6 @@ PIN_TRIADS: Array = _triads(PIN_QUARTERS)
 
 ARM_TRIADS: Array = _triads(ARM_QUARTERS)
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
-
-
-class Operation(Strict):
-    """Operating point of the joint."""
-
-    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["15 deg"])
-    """misalignment of the shafts, below 90 deg"""
-    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["500 rpm"])
-    """speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns the other way"""
-    torque: units.Torque = Field(examples=["100 N*m"])
-    """resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; negative: drives the
-    output shaft"""
-    axial_force: units.Force = Field(default=0.0, examples=["500 N"])
-    """axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint"""
-    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
-    """orders of the speed, { n, amplitude, phase } each"""
-    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
-    """orders of the resisting torque, { n, amplitude, phase } each"""
-
-    _split = model_validator(mode="before")(orders.split)
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """Misalignment of each joint (rad)."""
-        return (self.alpha,)
-
-    @property
-    def joint2(self) -> Joint | None:
-        """Joint 2 of a drive shaft, if it is another than joint 1."""
-        return None
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return the JSON schema of the table as a file writes it."""
-        schema = super().__get_pydantic_json_schema__(core, handler)
-        orders.join_schemas(handler.resolve_ref_schema(schema)["properties"])
-        return schema
-
-
-class OperationOfShaft(Operation):
-    """Operating point of a drive shaft; `alpha` is that of joint 1."""
-
-    shaft: DriveShaft
-    """joint 2 and the tubes"""
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """See `Operation.alphas`."""
-        return self.alpha, self.shaft.alpha
-
-    @property
-    def joint2(self) -> Joint | None:
-        """See `Operation.joint2`."""
-        return self.shaft.joint2
-
-
-MEANS = ("alpha", "speed", "torque", "axial_force")
-"""Numbers of an operating point; errors of it are deviations from them."""
-SPLINE = "shaft.spline"
-"""Error of what has a `spline.Spline`: its axial force as a share of the largest one, from -1 to 1."""
-
-
-def joints_of(joint: Joint, operation: Operation) -> tuple[Joint, ...]:
-    """Joints that are simulated together: `joint`, or joint 1 and joint 2 of a drive shaft."""
-    shaft = _shaft_of(operation)
-    return (joint,) if shaft is None else (joint, operation.joint2 or joint)
-
-
-def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
-    """What is simulated: a joint or a drive shaft, with the parts that its joints have."""
-    shaft = _shaft_of(operation)
-    return MECHANISMS[named(CARDAN if shaft is None else shaft.mechanism, parts_of(joint, operation))]
-
-
-def parts_of(joint: Joint, operation: Operation) -> set[str]:
-    """Those of `cardan.PARTS` of what is simulated."""
-    shaft = _shaft_of(operation)
-    return {*joint.parts} if shaft is None else shaft.parts(joint)
-
-
-def unbalances(joint: Joint, operation: Operation) -> dict[str, tuple[Unbalance | None, float | None]]:
-    """Unbalance of each body that may have one, and the mass of the body (kg)."""
-    shaft, last = _shaft_of(operation), joints_of(joint, operation)[-1].shaft
-    tubes = {} if shaft is None else shaft.tubes
-    return {name: (tube.unbalance, tube.mass) for name, tube in tubes.items()} | {
-        "output": (last.unbalance, last.mass)
-    }
-
-
-def _shaft_of(operation: Operation) -> DriveShaft | None:
-    return operation.shaft if isinstance(operation, OperationOfShaft) else None
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -195,7 +101,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """
     mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
-    shaft, own = _shaft_of(operation), dict(zip(prefixes(mechanism), joints_of(joint, operation), strict=True))
+    shaft, own = shaft_of(operation), dict(zip(prefixes(mechanism), joints_of(joint, operation), strict=True))
     last = own[prefixes(mechanism)[-1]]
     for name, value in _constants(joint, last).items():
         params[name] = value

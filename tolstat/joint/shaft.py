@@ -109,14 +109,14 @@ def of_joints(first: Collection[str], second: Collection[str]) -> set[str]:
     return OF_FIRST.intersection(first) | OF_SECOND.intersection(second)
 
 
-def by_keys(shaft: object, first: Collection[str], second: Collection[str] | None = None) -> Mechanism:
+def by_keys(shaft: object, first: Collection[str], second: Collection[str]) -> Mechanism:
     """What is simulated with a `[shaft]` as a study writes it, None without, with the parts of its joints."""
     if shaft is None:
         return MECHANISMS[named(CARDAN, first)]
     keys = shaft if isinstance(shaft, Mapping) else {}
     tubes = [keys.get(name) for name in ("tube", "tube2")]
     unbalanced = {"unbalance"} if any(isinstance(tube, Mapping) and "unbalance" in tube for tube in tubes) else set()
-    parts = of_joints(first, first if second is None else second) | unbalanced
+    parts = of_joints(first, second if "joint2" in keys else first) | unbalanced
     return MECHANISMS[named(SPLINED if "spline" in keys else SHAFT, parts)]
 
 
@@ -153,7 +153,7 @@ class DriveShaft(Strict):
 
     @field_serializer("joint2")
     def _as_given(self, joint2: Joint | None, info: SerializationInfo) -> dict[str, Any] | None:
-        return joint2 and joint2.given("json" if info.mode == "json" else "python")
+        return None if joint2 is None else joint2.given("json" if info.mode == "json" else "python")
 
     @model_validator(mode="after")
     def _fits(self) -> DriveShaft:

@@ -15,14 +15,14 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
-from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
+from tolstat.joint import MEANS, SPLINE, Joint, Operation, joints_of, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.reader import Reader
-from tolstat.study import Study, load, points, subset_of
+from tolstat.study import Study, load, mounting, subset_of
 from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
 
@@ -131,11 +131,11 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
 
 
 def note_on_mounting(store: Reader) -> str:
-    """Note where rigid shafts meet errors along them, see `points.note_on_shafts`; empty for other files."""
+    """Note where rigid shafts meet errors along them, see `mounting.note_on_shafts`; empty for other files."""
     names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
     joint, name = joint_of(store, 0), store.study_name
-    command = points.with_free_shaft(f"{name}.toml", name, joint)
-    return points.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
+    command = mounting.with_free_shaft(f"{name}.toml", name, joint)
+    return mounting.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

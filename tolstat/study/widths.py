@@ -90,7 +90,7 @@ def features(study: Study) -> list[Group]:
     """Each pin with its hole: all that is drawn of the two."""
     groups = [
         Group(f"{pin} and {hole}", tuple(name for name in _drawn(study) if name.rpartition(".")[0] in (pin, hole)))
-        for pin, hole, _ in study.mechanism.pairs
+        for pin, hole, *_ in study.mechanism.pairs
     ]
     return [group for group in groups if group.names]
 

@@ -7,7 +7,15 @@ from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, SerializationInfo, ValidationInfo, field_serializer, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializationInfo,
+    ValidationInfo,
+    WithJsonSchema,
+    field_serializer,
+    model_validator,
+)
 
 from tolstat.common import units
 from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
@@ -130,7 +138,7 @@ class Lumped(NamedTuple):
 
 
 class DriveShaft(Strict):
-    """Drive shaft of two joints: the second one, and what is between them. Joint 1 is the joint of the study."""
+    """Drive shaft of two joints: the second one, and what is between them. Joint 1 is that of [joint]."""
 
     alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
     """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
@@ -148,8 +156,10 @@ class DriveShaft(Strict):
     """The tube of joint 2, where a spline is; when left out: like that of joint 1"""
     spline: SplineOfTubes | None = None
     """Spline between two tubes; without it there is one tube"""
-    joint2: Joint | None = None
-    """Joint 2; when left out: like joint 1"""
+    joint2: Annotated[Joint | None, WithJsonSchema({"type": "object", "x-table": "overrides"})] = Field(
+        default=None, examples=[{"base": "pin25", "contact": {"clearance": "0.02 mm"}}]
+    )
+    """joint 2, as `[joint]` is joint 1, with a `base` of its own; when left out: like joint 1"""
 
     @field_serializer("joint2")
     def _as_given(self, joint2: Joint | None, info: SerializationInfo) -> dict[str, Any] | None:

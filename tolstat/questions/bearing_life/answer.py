@@ -213,7 +213,10 @@ def _why_unrated(lives: rating.Lives, joints: str) -> str:
 
 
 def _angle(lives: rating.Lives, part: float = 1.0) -> str:
-    return f"{math.degrees(part * lives.critical_amplitude):.3g} deg"
+    """Part of the critical amplitude; where that of two joints differs, of each by its name."""
+    angles = [f"{math.degrees(part * bearing.critical_amplitude):.3g} deg" for bearing in lives.bearings]
+    named = [f"{angle} (joint{number})" for number, angle in enumerate(angles, 1)]
+    return angles[0] if len(set(angles)) == 1 else " and ".join(named)
 
 
 def _at_points(lives: rating.Lives) -> Iterator[str]:

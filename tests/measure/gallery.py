@@ -2,8 +2,8 @@
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
 ``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``unlike_joints.h5``,
-``engine_order.h5``, ``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or
-all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
+``engine_order.h5``, ``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and
+``line_bored.h5``, of some joints or all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
 """
 
 from __future__ import annotations

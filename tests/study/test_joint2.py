@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from tests.study.test_shaft import FREE, HEAD, RANDOM, SCATTER, SPLINE, load, refused
-from tolstat import sampling
+from tests.support.environment import ROOT
+from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import blank_params
 from tolstat.joint import mechanism_of, nominal_errors, perturb
-from tolstat.study import changes, schema
+from tolstat.study import assumptions, changes, placing, schema
 from tolstat.study.points import Point
 
 ENDS = 'input.bearings = ["80 mm", "240 mm"], output.bearings = ["100 mm", "150 mm"]'
@@ -172,6 +173,34 @@ def test_keys_of_joint_2_are_changed() -> None:
     assert only.operation.joint2 == read.operation.joint2
     with pytest.raises(InputError, match=r"--set shaft\.joint2\.base: is another joint"):
         changes.read(read, changes.with_settings(read, ["shaft.joint2.base=cirelli2021"]))
+
+
+def test_common_axes_of_joint_2_are_as_long_as_its_cross() -> None:
+    """Zones of both pins of an axis lie R from the centre of their own joint; so do the warnings about short ones."""
+    zone = '{ zone = "⌀0.1 mm", over = "100 mm", distribution = "normal", cp = 1.0 }'
+    entry = f'[tolerances]\n"joint*.input_holes.position" = {zone}\n'
+    read = load(HEAD + OWN + SPLINE + entry + RANDOM)
+    reaches = [read.axes[f"joint{k}.input_holes"].reach for k in (1, 2)]
+    assert reaches == pytest.approx([0.07282, 0.043])
+    (warning,) = assumptions.warnings(read)
+    assert "100 mm is shorter than the 145.6 mm between the bearings" in warning.found
+
+
+def test_the_files_of_both_joints_go_where_the_study_goes(tmp_path) -> None:
+    (tmp_path / "rear.toml").write_text((ROOT / "data" / "joints" / "pin25.toml").read_text(encoding="utf-8"))
+    source, target = tmp_path / "a.toml", tmp_path / "far" / "b.toml"
+    source.write_text(WHOLE.replace('"pin25"', '"rear.toml"'), encoding="utf-8")
+    read = study.load(source)
+    text = placing.placed(read.text, source, target)
+    assert tomllib.loads(text)["shaft"]["joint2"]["base"] == "../rear.toml"
+    assert placing.joints_beside(read) == {}
+    (tmp_path / "rear.toml").unlink()
+    ((path, written),) = placing.joints_beside(read).items()
+    assert path == ("shaft", "joint2")
+    (tmp_path / "kept.toml").write_text(written, encoding="utf-8")
+    again = study.load(source, text=read.text.replace("rear.toml", "kept.toml"))
+    assert again.identity() == read.identity()
+    assert study.load(source, text=read.text, joint2=read.operation.joint2).identity() == read.identity()
 
 
 def test_editors_know_joint_2() -> None:

@@ -83,6 +83,11 @@ def joints_of(joint: Joint, operation: Operation) -> tuple[Joint, ...]:
     return (joint,) if shaft is None else (joint, operation.joint2 or joint)
 
 
+def having(name: str, joint: Joint, joint2: Joint | None) -> Joint:
+    """Joint that a name is about, ``joint2.pin1.offset_t``: `joint2` if that is not the same; else `joint`."""
+    return joint2 if joint2 is not None and name.startswith("joint2.") else joint
+
+
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
     """What is simulated: a joint or a drive shaft, with the parts that its joints have."""
     shaft = shaft_of(operation)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, with_orders
-from tests.support.held import FACES, RPM, TUBE, drive_shaft, held
+from tests.support.held import RPM, TUBE, drive_shaft, held
 from tests.support.statics import on_shafts
 from tolstat import joint, sampling, study
 from tolstat.common.loads import loads_of
-from tolstat.common.tables import SIMULATED, VALID, Options
+from tolstat.common.tables import SIMULATED, VALID, Options, Status
 from tolstat.joint import perturb
 from tolstat.solver.reference import reference_rows
 from tolstat.solver.simulation import simulate_rows
@@ -146,17 +146,18 @@ def test_a_shaft_turned_round_loads_its_joints_the_same() -> None:
 
 
 def test_two_unlike_joints_have_the_loads_of_another_integrator() -> None:
-    """Radau's method on a shaft with errors, one of whose joints turns in needles and rubs."""
-    sections = {"thrust": FACES, "friction": {"mu": 0.02, "radius": "12 mm"}, "contact": {"clearance": "0.015 mm"}}
-    shaft = drive_shaft(SIX, "Z", joint2=joint.load("pin25", sections | {"shaft": {"axial": "rigid"}}, "case.toml"))
+    """Radau's method on a shaft with errors, one of whose joints turns in needles and rubs; its faces are pressed."""
+    own = {"thrust": PRELOADED["thrust"], "friction": {"mu": 0.02, "radius": "12 mm"}, "shaft": {"axial": "rigid"}}
+    shaft = drive_shaft(SIX, "Z", joint2=joint.load("pin25", own, "case.toml"))
     errors = {"joint1.pin1.offset_t": 3e-5, "joint2.hole3.offset_t": -2e-5, "joint2.pin2.tilt_z": 5e-4}
     rows, mechanism = held(errors, alpha=EIGHT, speed=500 * RPM, drive_shaft=shaft, **PRELOADED)
     ours = simulate_rows(rows, Options(steps_per_rev=720), mechanism=mechanism).results
     assert ours["status"][0] in SIMULATED
-    theirs = reference_rows(rows, Options(steps_per_rev=180), mechanism=mechanism)
+    theirs = reference_rows(rows, Options(steps_per_rev=180), closure_tol=1e-4, mechanism=mechanism)
+    assert theirs["status"][0] == Status.OK
     for field in ("F_max", "T_max", "contact_max", "thrust_max"):
         largest = np.abs(theirs[field]).max()
-        np.testing.assert_allclose(ours[field], theirs[field], atol=1e-3 * largest, err_msg=field)
+        np.testing.assert_allclose(ours[field], theirs[field], atol=2e-4 * largest, err_msg=field)
 
 
 @pytest.mark.parametrize("speed", [500.0, 1000.0])

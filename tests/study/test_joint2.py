@@ -183,7 +183,7 @@ def test_common_axes_of_joint_2_are_as_long_as_its_cross() -> None:
     reaches = [read.axes[f"joint{k}.input_holes"].reach for k in (1, 2)]
     assert reaches == pytest.approx([0.07282, 0.043])
     (warning,) = assumptions.warnings(read)
-    assert "100 mm is shorter than the 145.6 mm between the bearings" in warning.found
+    assert "100 mm is shorter than the 146 mm between the bearings" in warning.found
 
 
 def test_the_files_of_both_joints_go_where_the_study_goes(tmp_path) -> None:

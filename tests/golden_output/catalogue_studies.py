@@ -130,10 +130,7 @@ UNLIKE = Campaign(
     {
         "show": ["show unlike_joints.toml"],
         "page": ["report unlike_joints.h5 --out page.html --accept '60 %'"],
-        "change": [
-            "change unlike_joints.h5 --set shaft.joint2.friction.mu=0.04 --set shaft.joint2.friction.mu_along=0.04",
-            "change unlike_joints.h5 --set shaft.joint2.base=cirelli2021",
-        ],
+        "change": ["change unlike_joints.h5 --set shaft.joint2.base=cirelli2021"],
     },
 )
 RINGS = Campaign(

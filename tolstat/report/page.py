@@ -219,7 +219,7 @@ def joint_values(store: Reader) -> Listing:
     InputError
         When this version cannot read the joint in the file.
     """
-    joint, joint2 = strict.validate(Joint, store.joint, f"{store.path}: joint"), store.operation.joint2
+    joint, joint2 = strict.validate(Joint, store.joint, f"{store.path}: joint"), recorded.joint2_of(store)
     rows = _different("joint1." if joint2 else "", joint)
     rows += _different("joint2.", joint2) if joint2 else []
     title = f"The joint: values that differ from {DEFAULT_JOINT}"

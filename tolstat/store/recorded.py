@@ -15,7 +15,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
-from tolstat.joint import MEANS, SPLINE, Joint, Operation, joints_of, operating, perturb, varied
+from tolstat.joint import MEANS, SPLINE, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
@@ -48,7 +48,13 @@ def joint_of(store: Reader, row: int) -> Joint:
 
 def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:
     """Joints that are simulated together in file slot `row`: one, or both of a drive shaft."""
-    return joints_of(joint_of(store, row), operation_of(store, row))
+    joint = joint_of(store, row)
+    return (joint, joint2_of(store) or joint) if store.mechanism.is_shaft else (joint,)
+
+
+def joint2_of(store: Reader) -> Joint | None:
+    """Joint 2 of drive shafts, the same at all operating points, if it is another than joint 1."""
+    return next((point.operation.joint2 for point in store.points.values()), None)
 
 
 def operation_of(store: Reader, row: int) -> Operation:
@@ -125,7 +131,7 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     numbers = np.unique(store.design()["variant"]) if store.variants else ()
     changed = [store.variants[number].values for number in numbers] or [{}]
     laws = [values.get("contact.law", nominal.contact.law) for values in changed]
-    if joint2 := store.operation.joint2:
+    if joint2 := joint2_of(store):
         return [joint2.shaft.axial], [*laws, joint2.contact.law]
     return [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed], laws
 
@@ -201,7 +207,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
-    joint2 = None if path is not None else store.operation.joint2
+    joint2 = None if path is not None else joint2_of(store)
     try:
         study = load(source, n=joints, text=text, joint=joint, joint2=joint2)
     except InputError as error:

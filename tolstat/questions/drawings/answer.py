@@ -139,7 +139,7 @@ def _worst(view: View) -> list[Panel]:
     panels = []
     for sample, words in loads.items():
         slot, row = int(view.slots(sample)), int(view.rows(sample))
-        joint, joint2 = recorded.joint_of(view.store, slot), view.store.operation.joint2
+        joint, joint2 = recorded.joint_of(view.store, slot), recorded.joint2_of(view.store)
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
         panels += _errors_of(_each(joint, joint2, errors), errors, title, f"drawn-{row}")
     return panels

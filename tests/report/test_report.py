@@ -305,7 +305,7 @@ def test_colours_differ_for_dichromats():
 
 
 def test_values_of_the_joint_that_differ_from_the_one_that_comes_along():
-    file = SimpleNamespace(path="x.h5", joint=joint.load("cirelli2021", {}, "x").given("json"))
+    file = SimpleNamespace(path="x.h5", points={}, joint=joint.load("cirelli2021", {}, "x").given("json"))
     assert joint_values(file).text == "none: it is cirelli2021"
     file.joint = joint.load("cirelli2021", {"contact": {"clearance": "0.05 mm", "law": "point"}}, "x").given("json")
     rows = [line.split("  ") for line in joint_values(file).text.splitlines()]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from tolstat.report import answer as reports
     from tolstat.report import page, parts
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
-    from tolstat.study import assumptions, crosses, points, rewriting, starter
+    from tolstat.study import assumptions, crosses, mounting, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
@@ -50,7 +50,7 @@ else:
     reports, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
-    names = ("assumptions", "crosses", "points", "rewriting", "schema", "spectrum", "starter")
-    assumptions, crosses, points, rewriting, schemas, spectra, starter = (
+    names = ("assumptions", "crosses", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
+    assumptions, crosses, mounting, points, rewriting, schemas, spectra, starter = (
         Late(f"tolstat.study.{name}") for name in names
     )

@@ -20,7 +20,7 @@ from tolstat.cli._library import (
     answers,
     assumptions,
     design,
-    points,
+    mounting,
     pool,
     recorded,
     rewording,
@@ -303,6 +303,13 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[table
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
+def print_warnings_of_joint2(path: Path, study: studies.Study) -> None:
+    """Print the warnings of joint 2 of a drive shaft, if it is another than joint 1; see `Joint.warnings`."""
+    if joint2 := study.operation.joint2:
+        for fault in joint2.warnings():
+            warn(f"warning: {path}: {replace(fault, place=f'shaft.joint2.{fault.place}')}")
+
+
 def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
@@ -312,11 +319,13 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     say(f"{study.name}: {study.joint_in_words}")
     for note in study.notes:
         say(f"note: {note}")
-    axial = [joint.shaft.axial for joint in study.joints]
-    command = points.with_free_shaft(str(path), path.stem, study.joint)
-    if note := points.note_on_shafts(study.tolerances, axial, study.mechanism, command):
+    joint2 = study.operation.joint2
+    axial = [joint.shaft.axial for joint in ([joint2] if joint2 else study.joints)]
+    command = mounting.with_free_shaft(str(path), path.stem, study.joint)
+    if note := mounting.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
+    print_warnings_of_joint2(path, study)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
     if study.sampling.replicates == 1 and (reason := design.without_interval(study.sampling.method)):

@@ -52,7 +52,7 @@ def plan(
     """
     study = loaded(study_file, n=n)
     print_study_notes(study_file, study)
-    if note := library.points.note_on_pins(study.tolerances, study.mechanism):
+    if note := library.mounting.note_on_pins(study.tolerances, study.mechanism):
         say(f"note: {note}")
     with progress() as shown:
         prediction = library.plan.plan(study, workers, pilot or library.plan.PILOT, shown.stage)

@@ -142,11 +142,15 @@ class Hinge(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """Pin in a hole, by the names of their lumps, and the hinge between their members."""
+    """Pin in a hole, by the names of their lumps, and the hinge between their members.
+
+    Pairs of one `kind` have the same stations, film, friction and faces.
+    """
 
     pin: str
     hole: str
     hinge: str
+    kind: str = "bearing"
 
 
 class Face(NamedTuple):
@@ -231,6 +235,11 @@ class Mechanism(NamedTuple):
         return tuple(dict.fromkeys(bushing.kind for bushing in self.bushings))
 
     @property
+    def pair_kinds(self) -> tuple[str, ...]:
+        """Kinds of pairs, each once."""
+        return tuple(dict.fromkeys(pair.kind for pair in self.pairs))
+
+    @property
     def rotations(self) -> tuple[str, ...]:
         """Those of `unknowns` that are rotations."""
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
@@ -312,6 +321,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "pin": [body[pair.pin] for pair in mechanism.pairs],
         "hole": [body[pair.hole] for pair in mechanism.pairs],
         "hinge": [hinge[pair.hinge] for pair in mechanism.pairs],
+        "pair_kind": [mechanism.pair_kinds.index(pair.kind) for pair in mechanism.pairs],
         "hinge_pin": [member[one.pin] for one in mechanism.hinges],
         "hinge_hole": [member[one.hole] for one in mechanism.hinges],
         "hinge_axis": [one.axis for one in mechanism.hinges],

@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from tolstat.joint.model import Joint as Joint
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
-    from tolstat.joint.perturbation import MEANS as MEANS
-    from tolstat.joint.perturbation import SPLINE as SPLINE
-    from tolstat.joint.perturbation import Operation as Operation
-    from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
-    from tolstat.joint.perturbation import mechanism_of as mechanism_of
+    from tolstat.joint.operation import MEANS as MEANS
+    from tolstat.joint.operation import SPLINE as SPLINE
+    from tolstat.joint.operation import Operation as Operation
+    from tolstat.joint.operation import OperationOfShaft as OperationOfShaft
+    from tolstat.joint.operation import joints_of as joints_of
+    from tolstat.joint.operation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
-    "perturbation": (
-        *("MEANS", "SPLINE", "Operation", "OperationOfShaft"),
-        *("mechanism_of", "nominal_errors", "operating", "perturb"),
-    ),
+    "operation": ("MEANS", "SPLINE", "Operation", "OperationOfShaft", "joints_of", "mechanism_of"),
+    "perturbation": ("nominal_errors", "operating", "perturb"),
     "reading": ("load", "varied"),
     "shaft": ("DriveShaft",),
 }

@@ -1,33 +1,31 @@
-"""Operating point, nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
+"""Nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema
 
-from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, named
+from tolstat.common.cardan import ARM_QUARTERS, PIN_QUARTERS
 from tolstat.common.loads import split
-from tolstat.common.mechanism import OBLIQUE, Mechanism
+from tolstat.common.mechanism import OBLIQUE, Mechanism, prefixes
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict
 from tolstat.common.tables import FACTORS, blank_params, tables
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Unbalance
-from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
+from tolstat.joint.operation import MEANS, SPLINE, Operation, joints_of, mechanism_of, shaft_of, unbalances
+from tolstat.joint.sections import RIGID, Arm, Hub, Pin
+from tolstat.joint.shaft import DriveShaft, Lumped
 from tolstat.joint.spline import Spline
 
 Table = NDArray[np.void]
+Place = tuple[float, float, float]
 
 
 def _triads(quarters: Sequence[int]) -> Array:
@@ -42,76 +40,6 @@ PIN_TRIADS: Array = _triads(PIN_QUARTERS)
 
 ARM_TRIADS: Array = _triads(ARM_QUARTERS)
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
-
-
-class Operation(Strict):
-    """Operating point of the joint."""
-
-    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["15 deg"])
-    """misalignment of the shafts, below 90 deg"""
-    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["500 rpm"])
-    """speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns the other way"""
-    torque: units.Torque = Field(examples=["100 N*m"])
-    """resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; negative: drives the
-    output shaft"""
-    axial_force: units.Force = Field(default=0.0, examples=["500 N"])
-    """axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint"""
-    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
-    """orders of the speed, { n, amplitude, phase } each"""
-    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
-    """orders of the resisting torque, { n, amplitude, phase } each"""
-
-    _split = model_validator(mode="before")(orders.split)
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """Misalignment of each joint (rad)."""
-        return (self.alpha,)
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return the JSON schema of the table as a file writes it."""
-        schema = super().__get_pydantic_json_schema__(core, handler)
-        orders.join_schemas(handler.resolve_ref_schema(schema)["properties"])
-        return schema
-
-
-class OperationOfShaft(Operation):
-    """Operating point of a drive shaft; `alpha` is that of joint 1."""
-
-    shaft: DriveShaft
-    """joint 2 and the tubes"""
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """See `Operation.alphas`."""
-        return self.alpha, self.shaft.alpha
-
-
-MEANS = ("alpha", "speed", "torque", "axial_force")
-"""Numbers of an operating point; errors of it are deviations from them."""
-SPLINE = "shaft.spline"
-"""Error of what has a `spline.Spline`: its axial force as a share of the largest one, from -1 to 1."""
-
-
-def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
-    """What is simulated: a joint or a drive shaft, with the parts that the joint has."""
-    shaft = _shaft_of(operation)
-    base = CARDAN if shaft is None else shaft.mechanism
-    return MECHANISMS[named(base, joint.parts if shaft is None else (*joint.parts, *shaft.parts))]
-
-
-def unbalances(joint: Joint, operation: Operation) -> dict[str, tuple[Unbalance | None, float | None]]:
-    """Unbalance of each body that may have one, and the mass of the body (kg)."""
-    shaft = _shaft_of(operation)
-    tubes = {} if shaft is None else shaft.tubes
-    return {name: (tube.unbalance, tube.mass) for name, tube in tubes.items()} | {
-        "output": (joint.shaft.unbalance, joint.shaft.mass)
-    }
-
-
-def _shaft_of(operation: Operation) -> DriveShaft | None:
-    return operation.shaft if isinstance(operation, OperationOfShaft) else None
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -160,9 +88,9 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     Parameters
     ----------
     joint : Joint
-        The nominal joint.
+        The nominal joint; of a drive shaft joint 1.
     operation : Operation
-        The operating point; errors of it are deviations that are added.
+        The operating point, which has joint 2 if that differs; errors of it are deviations that are added.
     errors : ndarray, shape (n,), dtype ERROR
         Row i holds the errors of joint i.
 
@@ -173,13 +101,20 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """
     mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
-    shaft = _shaft_of(operation)
-    for name, value in _constants(joint).items():
+    shaft, own = shaft_of(operation), dict(zip(prefixes(mechanism), joints_of(joint, operation), strict=True))
+    last = own[prefixes(mechanism)[-1]]
+    for name, value in _constants(joint, last).items():
         params[name] = value
-    for name, of_kinds in _of_kinds(joint, shaft).items():
+    params["R"] = min(each.cross.R for each in own.values())
+    for name, of_kinds in _of_kinds(own, shaft).items():
         kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
         params[name] = [of_kinds[kind] for kind in kinds]
-    point = operating(operation, errors, joint.shaft.spline)
+    for k, each in enumerate(own.values()):
+        for name, value in _of_pairs(each).items():
+            params[name][:, k] = value
+        if each.friction.mu is not None:
+            params["mu"][:, k] = each.friction.mu + errors["friction.mu"]
+    point = operating(operation, errors, last.shaft.spline)
     params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     lumps = mechanism.lumps
     triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
@@ -189,7 +124,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params["ahead"][:, 1] = 0.5 * np.pi + shaft.offset + errors["shaft.offset"]
         triads |= _on_tube(params["ahead"][:, 1] + shaft.plane)
         params["triad"] = np.stack(np.broadcast_arrays(*(triads[lump.name] for lump in lumps)), axis=1)
-    if joint.shaft.slides:
+    if last.shaft.slides:
         params["F_a"] = point["axial_force"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
     for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
@@ -197,19 +132,19 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     factor = errors["material.E_factor"]
     params["k"] *= factor[:, None, None]
     for name in ("station_k1", "station_k2", "station_k3"):
-        params[name] *= factor[:, None]
+        params[name] *= factor[:, None, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         params["c"] *= np.sqrt(factor)[:, None, None]
-    for i, (pin, hole, _) in enumerate(mechanism.pairs):
+    for i, (pin, hole, _, kind) in enumerate(mechanism.pairs):
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
         deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"])
-        params["clearance"][:, i] = _clearance(joint.contact, *deviations)
-    if joint.thrust is not None:
-        half = 0.5 * joint.contact.z
-        for i, face in enumerate(mechanism.faces):
-            play = joint.thrust.end_play + errors[f"{face.name.rstrip('1234')}.end_play"]
-            params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+        params["clearance"][:, i] = _clearance(own[kind.removesuffix("bearing")].contact, *deviations)
+    for i, face in enumerate(mechanism.faces):
+        name = face.name.rstrip("1234")
+        each = own[name.removesuffix("thrust")]
+        half, play = 0.5 * each.contact.z, (each.thrust.end_play if each.thrust else 0.0) + errors[f"{name}.end_play"]
+        params["face_at"][:, i] = np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if shaft is not None and shaft.spline is not None:
         params["push"] = _sticking(errors, shaft.spline, point["torque"])
     of_bodies = unbalances(joint, operation)
@@ -218,27 +153,18 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         size = (unbalance.size(mass) if unbalance else 0.0) + errors[f"{body}.unbalance"]
         angle = (unbalance.angle or 0.0 if unbalance else 0.0) + errors[f"{body}.unbalance_angle"]
         params["unbalance"][:, i] = (size * np.array([np.cos(angle), np.sin(angle)])).T
-    if joint.friction.mu is not None:
-        params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params
 
 
-def _constants(joint: Joint) -> dict[str, Any]:
-    """Parameters that do not depend on the errors, at factor 1 on E."""
-    contact, shaft, stations = joint.contact, joint.shaft, joint.contact.springs(joint.bearing)
-    unused = (0, MAX_STATIONS - len(stations.s))
+def _constants(first: Joint, last: Joint) -> dict[str, Any]:
+    """Parameters of the outer shafts, which do not depend on the errors."""
+    shaft = last.shaft
     return {
-        "R": joint.cross.R,
         "Js": shaft.Js,
-        "face_k": joint.thrust.k if joint.thrust else 0.0,
-        "face_c": joint.thrust.c if joint.thrust else 0.0,
-        "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
-        "mu_ratio": joint.friction.ratio,
-        "slip_speed": joint.friction.slip_speed,
         "bearing_at": np.reshape(
             [
                 sign * np.array(ends.bearings)
-                for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
+                for sign, ends in ((-1.0, first.shaft.input), (1.0, shaft.output))
                 if ends is not None
             ],
             (-1, 2),
@@ -246,9 +172,22 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides or shaft.lateral != RIGID else 0.0,
         "k_l": shaft.k_l,
-        "c_l": 2 * joint.bushing.xi * math.sqrt(shaft.k_l * (shaft.mass or 0.0)),
+        "c_l": 2 * last.bushing.xi * math.sqrt(shaft.k_l * (shaft.mass or 0.0)),
         "k_a": shaft.k_a,
         "c_a": shaft.axial_damping if shaft.slides else 0.0,
+    }
+
+
+def _of_pairs(joint: Joint) -> dict[str, Any]:
+    """Parameters of the pins of a joint in their holes, at factor 1 on E."""
+    contact, stations = joint.contact, joint.contact.springs(joint.bearing)
+    unused = (0, MAX_STATIONS - len(stations.s))
+    return {
+        "face_k": joint.thrust.k if joint.thrust else 0.0,
+        "face_c": joint.thrust.c if joint.thrust else 0.0,
+        "friction_radius": joint.friction.radius or 0.5 * contact.D_P,
+        "mu_ratio": joint.friction.ratio,
+        "slip_speed": joint.friction.slip_speed,
         "c_d": contact.c_d,
         "c_t": contact.c_t,
         "delta_d": contact.delta_d,
@@ -266,15 +205,15 @@ OF_LUMPS = ("mass", "inertia", "at")
 """Parameters of kinds of lumps; others of `_of_kinds` are of kinds of bushings."""
 
 
-def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any]]:
-    """Parameters of lumps and bushings by kind, at factor 1 on E, in a joint or in a drive shaft."""
-    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
+def _of_kinds(own: Mapping[str, Joint], shaft: DriveShaft | None) -> dict[str, dict[str, Any]]:
+    """Parameters of lumps and bushings by kind, at factor 1 on E; `own`: joints by what stands before their parts."""
+    *_, last = own.values()
     of: dict[str, dict[str, Any]] = {name: {} for name in (*OF_LUMPS, "k", "c", "marker")}
 
-    def lump(kind: str, body: Hub | Pin | Arm | Lumped, at: tuple[float, float, float]) -> None:
+    def lump(kind: str, body: Hub | Pin | Arm | Lumped, at: Place) -> None:
         of["mass"][kind], of["inertia"][kind], of["at"][kind] = body.mass, body.inertia, at
 
-    def bushing(kind: str, k: Array, body: Pin | Arm | Lumped, markers: Sequence[tuple[float, float, float]]) -> None:
+    def bushing(kind: str, k: Array, body: Pin | Arm | Lumped, markers: Sequence[Place], joint: Joint) -> None:
         damping = material.bushing_damping(k, body.mass, np.array(body.inertia), joint.bushing.xi)
         of["k"][kind], of["c"][kind], of["marker"][kind] = k, damping, markers
 
@@ -291,21 +230,22 @@ def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any
         }
     for end, base in ends.items():
         prefix = end.removesuffix("input").removesuffix("output")
-        side = -1.0 if end.endswith("input") else 1.0
+        side, joint = -1.0 if end.endswith("input") else 1.0, own[prefix]
+        R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
         lump(f"{prefix}hub", joint.hub, (0.0, 0.0, 0.0))
         lump(f"{prefix}pin", joint.pin, (R, 0.0, 0.0))
         lump(f"{prefix}arm", joint.arm, (R, 0.0, 0.0))
-        bushing(f"{prefix}cross", joint.k_cross, joint.pin, [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)])
+        bushing(f"{prefix}cross", joint.k_cross, joint.pin, [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)], joint)
         fork = [(0.0, 0.0, side * l_f), (R, 0.0, side * l_f - base)]
-        bushing(f"{end} fork", joint.k_fork, joint.arm, fork)
+        bushing(f"{end} fork", joint.k_fork, joint.arm, fork, joint)
     if shaft is not None:
-        lump("joint2.arm of tube", joint.arm, (R, 0.0, shaft.length))
+        lump("joint2.arm of tube", last.arm, (last.cross.R, 0.0, shaft.length))
         for name, tube in tubes.items():
             lump(name, tube, (0.0, 0.0, tube.at))
         if spline := shaft.spline:
             k = np.array([*[spline.k_lateral] * 2, 0.0, *[spline.k_bending] * 2, spline.k_torsion])
             places = [(0.0, 0.0, spline.at - tubes[name].at) for name in ("tube2", "tube1")]
-            bushing("spline", k, tubes["tube2"], places)
+            bushing("spline", k, tubes["tube2"], places, last)
             of["c"]["spline"][2] = spline.axial_damping
     return of
 

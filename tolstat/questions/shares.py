@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.study import Study
-from tolstat.study.placing import joint_beside, placed
+from tolstat.study.placing import joints_beside, placed
 from tolstat.study.points import at
 from tolstat.study.rewriting import with_keys
 
@@ -47,7 +47,7 @@ ORIGIN = {
 }
 """Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
-JOINT_FILE = "_joint.toml"
+JOINT_FILES = {"joint": "_joint.toml", "joint2": "_joint2.toml"}
 """End of the name of a joint file that is written beside a study."""
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
@@ -131,14 +131,19 @@ def unusable(view: View, reason: str, remedy: str) -> StoreError:
 
 
 def study_documents(study: Study, changed: str) -> list[Document]:
-    """Study of a changed text, and the file of its joint where that has to be written, as they run where they lie."""
-    joint = joint_beside(study)
+    """Study of a changed text, and files of its joints where these have to be written, as they run where they lie."""
+    joints = {path: (JOINT_FILES[str(path[-1])], text) for path, text in joints_beside(study).items()}
 
     def of(path: Path) -> str:
-        here, base = placed(changed, study.path, path), {"base": f"{path.stem}{JOINT_FILE}"}
-        return with_keys(here, {("joint",): base}, path.name) if joint else here
+        here = placed(changed, study.path, path)
+        bases = {at: {"base": f"{path.stem}{end}"} for at, (end, _) in joints.items()}
+        return with_keys(here, bases, path.name) if bases else here
 
-    return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
+    return [Document(".toml", of), *(Document(end, partial(_given, text)) for end, text in joints.values())]
+
+
+def _given(text: str, _: Path) -> str:
+    return text
 
 
 def check_sample(view: View) -> None:

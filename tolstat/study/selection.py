@@ -298,8 +298,8 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        joint = self.parts.get("joint")
-        return by_keys(self.data.get("shaft"), joint.parts if joint else PARTS)
+        first, second = (joint.parts if (joint := self.parts.get(name)) else PARTS for name in ("joint", "joint2"))
+        return by_keys(self.data.get("shaft"), first, second)
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

@@ -95,9 +95,10 @@ def no_errors(joint: Joint) -> NDArray[np.void]:
 
 def errors_in(joint: Joint, errors: NDArray[np.void], before: str) -> NDArray[np.void]:
     """Errors of a Cardan joint of one mechanism, (1,) table ERROR as of `no_errors`; `before` as of `joints_in`."""
-    of_joint = no_errors(joint)
+    of_joint, every = no_errors(joint), errors.dtype.names or ()
     for name in of_joint.dtype.names or ():
-        of_joint[name] = errors[f"{before}{name}" if f"{before}{name}" in (errors.dtype.names or ()) else name]
+        if found := next((own for own in (f"{before}{name}", name) if own in every), ""):
+            of_joint[name] = errors[found]
     return of_joint
 
 

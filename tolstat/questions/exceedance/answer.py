@@ -17,7 +17,7 @@ from tolstat.joint.perturbation import one_force
 from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
-from tolstat.store.recorded import joint_of
+from tolstat.store.recorded import joints_at
 from tolstat.store.view import View
 
 SAMPLED, TOTAL = (shares.shares(f"{kind}lower", f"{kind}upper") for kind in ("", "total_"))
@@ -238,7 +238,7 @@ def _beyond(view: View) -> str:
     forces = [view.load(name).nominal for name in names if name in view.bushing_loads]
     if not forces or len(view.points) > 1:
         return ""
-    torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R
+    torque, radius = abs(view.store.operation.torque), joints_at(view.store, 0)[-1].cross.R
     if not max(forces) < torque / (2.0 * radius):
         return ""
     at_middle = text.value(torque / (2.0 * radius), "N")

@@ -182,7 +182,7 @@ def test_common_axes_of_joint_2_are_as_long_as_its_cross() -> None:
     read = load(HEAD + OWN + SPLINE + entry + RANDOM)
     reaches = [read.axes[f"joint{k}.input_holes"].reach for k in (1, 2)]
     assert reaches == pytest.approx([0.07282, 0.043])
-    (warning,) = assumptions.warnings(read)
+    warning, _ = assumptions.warnings(read)  # the other: joint 2 has bearings of the input shaft
     assert "100 mm is shorter than the 146 mm between the bearings" in warning.found
 
 
@@ -207,3 +207,16 @@ def test_editors_know_joint_2() -> None:
     known = jsonschema.Draft7Validator(schema.schema("study"))
     assert list(known.iter_errors(tomllib.loads(WHOLE))) == []
     assert not known.is_valid(tomllib.loads(WHOLE.replace(RIGID, 'croos.R = "50 mm"\n')))
+
+
+def test_keys_of_the_shaft_that_the_other_joint_has_are_told() -> None:
+    read = load(HEAD.replace("[joint]\n", "[joint]\nshaft.output.bearings = ['80 mm', '240 mm']\n", 1) + OWN + REST)
+    told = [(fault.place.rpartition(": ")[2], fault.found) for fault in assumptions.warnings(read)]
+    assert ("joint.shaft.output", "has no effect: the output shaft is that of [shaft.joint2]") in told
+    assert ("shaft.joint2.shaft.input", "has no effect: the input shaft is that of [joint]") in told
+
+
+def test_a_joint_2_that_is_no_table_is_refused_as_a_change() -> None:
+    read = load(WHOLE)
+    with pytest.raises(InputError, match=r"leaves out .*base.*, which the study sets"):
+        changes.with_settings(read, ["shaft.joint2=pin25"])

@@ -227,10 +227,25 @@ ROUNDING = 1e-9
 
 
 def warnings(study: Study) -> Iterator[Fault]:
-    """Warnings about a study: short common axes, errors far wider than the clearance, speeds far too high."""
+    """Warnings about a study: short axes, errors far wider than the clearance, speeds far too high, idle shafts."""
     yield from (study.fault(*warning) for warning in short_axes(study.entries, lambda name: _contact(study, name).z))
     yield from _wide_bands(study)
     yield from _fast_points(study)
+    if study.operation.joint2 is not None:
+        yield from _idle_ends(study)
+
+
+def _idle_ends(study: Study) -> Iterator[Fault]:
+    """Keys of a study for an outer shaft that is the other joint's."""
+    data = leaves(tomllib.loads(study.text))
+    for key, end, section, owner in (
+        ("output", "output", "joint", "shaft.joint2"),
+        ("unbalance", "output", "joint", "shaft.joint2"),
+        ("input", "input", "shaft.joint2", "joint"),
+    ):
+        if any(name.startswith(f"{section}.shaft.{key}.") for name in data):
+            found, remedy = f"has no effect: the {end} shaft is that of [{owner}]", f"write it as {owner}.shaft.{key}"
+            yield study.fault(f"{section}.shaft.{key}", found, remedy)
 
 
 def _contact(study: Study, name: str) -> Contact:

@@ -120,10 +120,10 @@ def _keys_of_joint(text: str, study: Study, path: Sequence[str]) -> dict[str, An
 
 
 def _table(text: str, path: Sequence[str]) -> Mapping[str, Any]:
-    table = tomllib.loads(text)
+    table: Any = tomllib.loads(text)
     for key in path:
-        table = table.get(key, {})
-    return table
+        table = table.get(key, {}) if isinstance(table, Mapping) else {}
+    return table if isinstance(table, Mapping) else {}
 
 
 def words(study: Study, text: str) -> str:

@@ -258,18 +258,21 @@ def bearings_of(view: View) -> list[Bearing | None]:
 
 def _bearings(view: View) -> tuple[Bearing, ...]:
     """Section ``[bearing]`` of the joints of a file, with all that a life needs."""
-    return tuple(_complete(view, bearing) for bearing in bearings_of(view))
+    sections = ("joint", "joint" if recorded.joint2_of(view.store) is None else "shaft.joint2")
+    return tuple(_complete(view, *both) for both in zip(bearings_of(view), sections, strict=False))
 
 
-def _complete(view: View, bearing: Bearing | None) -> Bearing:
+def _complete(view: View, bearing: Bearing | None, section: str) -> Bearing:
+    """Bearing of the joint of a section of the study; refused without what a life needs."""
     again = "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
-        remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
+        remedy = f"add the section [bearing] to the joint file or [{section}.bearing] to the study, {again}"
         raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
         incomplete = f"holds needle bearings without {', '.join(lacking)}, which a rating life needs"
         error = inapplicable if bearing.C is None and bearing.required_life is None else unusable
-        raise error(view, incomplete, f"add to [bearing] of the joint, {again}")
+        keys = " and ".join(f"{section}.bearing.{key}" for key in lacking)
+        raise error(view, incomplete, f"add {keys} to the study, or to [bearing] of the joint file, {again}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(kinds(view.mechanism)["contact"].places):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)

@@ -258,8 +258,9 @@ def draw_joint(joint: joints.Joint, at: float | joints.Operation, title: str = "
     """
     if isinstance(at, joints.OperationOfShaft):
         each = [views.views(own, alpha) for own, alpha in zip(joints.joints_of(joint, at), at.alphas, strict=True)]
-        sides = [_named(panels, f"joint{number}.")[1] for number, panels in enumerate(each, 1)]
-        panels = [shaft.picture(joint, at), each[0][0], *sides]
+        named = [_named(panels, f"joint{number}.") for number, panels in enumerate(each, 1)]
+        fronts = [front for front, _ in named] if at.joint2 else [each[0][0]]
+        panels = [shaft.picture(joint, at), *fronts, *(side for _, side in named)]
     else:
         panels = list(views.views(joint, at.alpha if isinstance(at, joints.Operation) else at))
     return drawing.sheet(panels, title or joint.description or "Cardan joint", NOTES, columns)

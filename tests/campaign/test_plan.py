@@ -138,9 +138,9 @@ def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
 
 
 def test_until_is_for_independent_samples(tmp_path: Path) -> None:
-    (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
+    (tmp_path / "s.toml").write_text(synthetic.SWEEP, encoding="utf-8")
     loaded = study.load(tmp_path / "s.toml")
-    with pytest.raises(InputError, match=r"sampling\.method is 'sobol': .* independent samples"):
+    with pytest.raises(InputError, match=r"sampling\.method is 'sweep': .* independent samples"):
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE, {}, CARDAN), lambda row: None)
 
 

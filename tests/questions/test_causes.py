@@ -99,9 +99,9 @@ def refuses(view, load, costs):
 
 
 def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_path):
-    text = (
-        TEXT.replace('"random"', '"lhs"').replace("seed = 2021", 'seed = 2021\nmethod = "lhs"').replace("3000", "400")
-    )
+    lot = '"hole1.tilt_t" = { plus_minus = "0.1 deg", distribution = "normal", lot = { share = 0.5 } }'
+    text = TEXT.replace("seed = 2021", "seed = 2021\njoints_per_lot = 10").replace("3000", "400")
+    text = text.replace("[tolerances]", f"[tolerances]\n{lot}")
     text += '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
     done = call("causes", made(tmp_path, text))
     assert done.exit_code == 0

@@ -86,7 +86,7 @@ def test_joints_without_a_load_count_both_ways():
 def test_joints_that_share_lots_are_not_independent_anywhere():
     made = of_lots()
     assert not made.design.independent
-    assert made.design.has_intervals
+    assert made.design.is_sample
     load = made.load("cross1.F")
     independent = exceedance.exceedance(load.values, load.status, 700.0)
     assert load.above(700.0).lower != independent.lower

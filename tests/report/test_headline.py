@@ -4,14 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import reports, synthetic
 from tests.support.views import view
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
-from tolstat.cli import app
 from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Simulation, Status, tables
 from tolstat.display.answer import Asked
@@ -62,8 +60,6 @@ MISLEADING = {
     "all failed": (lambda d: synthetic.store(d, study(), failed=60), "none", "100 % of the joints have no result"),
     "half interfering": (interfering, "none", "59 % of the joints have no result (36 of 61)"),
     "failed at one point": (failed_at_one_point, "none", "66.7 % of the joints have no result (40 of 60)"),
-    "Sobol'": (lambda d: synthetic.store(d, study(64, "sobol")), "none", "shares of Sobol' points have no interval"),
-    "Latin hypercube": (lambda d: synthetic.store(d, study(64, "lhs")), "none", "a Latin hypercube have no interval"),
     "interrupted": (
         lambda d: synthetic.store(d, study(600), simulated=300), "open",
         "open: 0 % exceed 1500 N on cross1.F (0 .. 1.23 %); 1 % is accepted; 368 joints would decide it",
@@ -112,7 +108,6 @@ def test_no_verdict_says_more_than_the_file(tmp_path, name):
     [
         ("all failed", "no verdict: 100 % of the joints have no result (60 of 60)"),
         ("half interfering", "no verdict: 59 % of the joints have no result (36 of 61)"),
-        ("Sobol'", "100 % of the joints keep the limit (64 of 64; no interval)"),
         ("interrupted", "100 % of the joints keep the limit (299 of 299; total interval 98.8 .. 100 %)"),
         ("three joints", "no verdict: 3 joints are too few"),
     ],
@@ -229,16 +224,3 @@ def test_joints_that_would_decide_count_those_without_a_result():
     assert needed(2 / 200, 0.02) > needed(0.0, 0.02)
     near = exceedance.limit_rows(view(failed=1, limits={"cross1.F": 2000.0}))[0]
     assert headline._deciding(near, 0.003) == "no number of joints would decide it"
-
-
-@pytest.mark.parametrize(("method", "told"), [("sobol", True), ("lhs", True), ("random", False)])
-def test_run_and_plan_tell_before_that_shares_will_have_no_interval(tmp_path, monkeypatch, method, told):
-    monkeypatch.chdir(tmp_path)
-    source = tmp_path / "s.toml"
-    source.write_text(study(64, method), encoding="utf-8")
-    monkeypatch.setattr("tolstat.cli.run.simulate", lambda *given, **choices: None)
-    monkeypatch.setattr("tolstat.cli.run.conclude", lambda *given: None)
-    monkeypatch.setattr("tolstat.campaign.plan.plan", lambda *given: 1 / 0)
-    for command in ("run", "plan"):
-        done = CliRunner().invoke(app, [command, str(source), "--quiet"])
-        assert ("have no interval: set sampling.replicates" in done.stderr) == told

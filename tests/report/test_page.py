@@ -383,13 +383,6 @@ def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
     assert text.count(">no verdict<") == 8
 
 
-def test_dependent_samples_have_no_interval_on_the_page(tmp_path):
-    text = synthetic.STUDY.replace("seed = 2021", 'seed = 2021\nmethod = "sobol"')
-    said = words(synthetic.store(tmp_path, text), 0.01)[1]
-    assert any(line.startswith("No intervals: Clopper–Pearson holds for independent samples only") for line in said)
-    assert said.count("no verdict") == 7
-
-
 @pytest.mark.slow
 def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
     page.write_page(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), tmp_path / "page.html")

@@ -147,7 +147,7 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
     of_a, of_b = (side.quantile(share, confidence) for side in (a, b))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
-    known = all(side.design.independent if paired else side.design.has_intervals for side in (a, b))
+    known = all(side.design.independent if paired else side.design.is_sample for side in (a, b))
     if known and paired and min(share, 1.0 - share) * x.size >= BEYOND:
         tail = 0.5 * (1.0 - confidence)
         resampled = np.quantile(_resampled(x, y, share), [tail, 1.0 - tail], method="inverted_cdf")

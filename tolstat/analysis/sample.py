@@ -222,7 +222,7 @@ class Sample:
     def _interval(self, share: float, confidence: float) -> tuple[float, float]:
         """Ends of the interval of a quantile."""
         loads, n = self.valid, self.value.n
-        if not self.design.has_intervals:
+        if not self.design.is_sample:
             return np.nan, np.nan
         below = np.append(np.nextafter(loads[:1], -np.inf), loads[:-1])
 

@@ -26,7 +26,7 @@ from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
 from tolstat.joint import ideal
-from tolstat.sampling import dimensions, draw, streams
+from tolstat.sampling import draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.histories import history_specs
@@ -241,7 +241,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     valid = slice(study.first_sample, None)
     status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
     specs = history_specs(solver, study.output.histories, study.output.harmonics, study.mechanism)
-    document = metadata.of_study(study, range(study.rows), specs, dimensions(study.mechanism), solver, choice)
+    document = metadata.of_study(study, range(study.rows), specs, solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -272,10 +272,7 @@ def _joints(
     study: Study, rows: NDArray[np.intp], choice: dict[str, Any]
 ) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
     """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
-    if study.sampling.method == "lhs":
-        errors = draw(study)[rows]
-    else:
-        errors = np.concatenate([draw(study, range(row, row + 1)) for row in rows])
+    errors = np.concatenate([draw(study, range(row, row + 1)) for row in rows])
     each_options = [settings(solver, choice) for solver in study.solvers]
     at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
     return at, [each_options[number] for number in variants(study, rows)]

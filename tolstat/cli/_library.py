@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from tolstat import store as stores
     from tolstat import study as studies
     from tolstat.analysis import accuracy as numerical
-    from tolstat.analysis import design
     from tolstat.campaign import extend, function, plan, pool, remedy, run, stop_rule
     from tolstat.campaign import replay as replays
     from tolstat.campaign import verify as checks
@@ -34,8 +33,8 @@ if TYPE_CHECKING:
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
-    names = ("numpy", "tolstat.store", "tolstat.study", "tolstat.analysis.accuracy", "tolstat.analysis.design")
-    np, stores, studies, numerical, design = map(Late, names)
+    names = ("numpy", "tolstat.store", "tolstat.study", "tolstat.analysis.accuracy")
+    np, stores, studies, numerical = map(Late, names)
     names = ("extend", "function", "plan", "pool", "remedy", "replay", "run", "stop_rule", "verify", "work")
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names

@@ -19,7 +19,6 @@ from tolstat import __version__
 from tolstat.cli._library import (
     answers,
     assumptions,
-    design,
     points,
     pool,
     recorded,
@@ -307,7 +306,7 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
     These are mounting and contact law; notes on measured signals and joints; warnings of its joints, of values that are
-    probably not meant, shares without an interval, and a note where rigid shafts meet errors along them.
+    probably not meant, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
     for note in study.notes:
@@ -319,5 +318,3 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if study.sampling.replicates == 1 and (reason := design.without_interval(study.sampling.method)):
-        warn(f"warning: {reason}")

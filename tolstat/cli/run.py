@@ -158,7 +158,7 @@ def extend(
     """Add joints to a campaign and simulate them.
 
     Draws the next joints of the sampling sequence and simulates them; the joints already in FILE do not change. FILE
-    then equals that of a campaign with N joints from the start. Latin hypercubes, sweeps and listed joints cannot be
+    then equals that of a campaign with N joints from the start. Sweeps and listed joints cannot be
     extended. Prints the report and writes its files as tolstat run does.
 
     To resume after an interruption: tolstat run STUDY --n N --out FILE

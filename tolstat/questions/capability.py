@@ -105,7 +105,7 @@ def capability(
         When N is not above one.
     """
     if not view.limits or view.method in ("sweep", "cases"):
-        remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
+        remedy = 'give the result file of a study with [limits] and sampling.method = "random"'
         raise shares.inapplicable(view, "has no limits, or its joints are no random sample", remedy)
     view.check()
     rows = limit_rows(view, delivery)
@@ -262,5 +262,3 @@ def _notes(rows: Rows) -> Iterator[str]:
         yield f"lower ends of Cpk need {first['needed']} valid joints"
     if any(row["normal_p"] < NOT_NORMAL for row in rows):
         yield f"'Cpk by sigma' tells no share above of a load that is not normal (p < {NOT_NORMAL:g})"
-    if all(math.isnan(row["ppm_lower"]) for row in rows):
-        yield f"{shares.NO_INTERVALS}; run replicates of other seeds"

@@ -130,8 +130,8 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
     parts.append(Table("loads", "Largest loads, before and after", LOADS, quantiles))
     notes = [f"{n} joints compared one by one; 95 % intervals without the numerical error, not corrected for the looks"]
     notes.insert(0, changes.words(view.study, asked.text))
-    if view.method != "random" or view.store.sampling.get("joints_per_lot", 1) > 1:
-        notes.append("joints are drawn independently here: without lots, Sobol' points or a Latin hypercube")
+    if not view.design.independent:
+        notes.append("joints are drawn independently here: without lots")
     if len(view.limits) > len(loads):
         notes.append("largest loads: of each kind the one whose limit most joints exceed")
     if not facts["settled"]:

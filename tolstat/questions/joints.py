@@ -151,7 +151,7 @@ def tolerances(view: View) -> Answer:
         When the study cannot be read.
     """
     if not view.sampled:
-        remedy = 'give the result file of a study with [tolerances] and sampling.method "random", "sobol" or "lhs"'
+        remedy = 'give the result file of a study with [tolerances] and sampling.method = "random"'
         raise inapplicable(view, "holds joints that are no random sample", remedy)
     entries = meanings(view.study.entries).to_dict("records")
     correlated = correlations(view.study.copula, view.study.tolerances).to_dict("records")

@@ -138,15 +138,13 @@ def _limit(view: View, row: table.Row) -> str:
 
 def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) -> Verdict:
     """Without an accepted share: share of the joints that keep all limits."""
-    without = view.design.without_interval("share")
-    notes: tuple[str, ...] = (without,) if without else ()
     in_words = shares.together(shares.good(view), len(view.limits))
     if not in_words.decides:
-        return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
+        return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), ())
     behind = [sentences.of_variations(standing, ""), text.capital(_without_errors(view))]
     missing = sentences.not_varied(standing, view.path.name)
     words = ". ".join([in_words.words + (f"; {missing}" if missing else ""), *filter(None, behind)])
-    return Verdict("", in_words.value, words, notes, exceedance.most_exceeded(view, records)["load"])
+    return Verdict("", in_words.value, words, (), exceedance.most_exceeded(view, records)["load"])
 
 
 def _reason(view: View, records: Sequence[table.Row]) -> str:
@@ -156,8 +154,6 @@ def _reason(view: View, records: Sequence[table.Row]) -> str:
     if any(map(shares.unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if without := view.design.without_interval("share"):
-        return without
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 

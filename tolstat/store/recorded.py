@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent, Listed, Replicated
+from tolstat.analysis.design import Design, Independent, Listed
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
@@ -203,7 +203,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         remedy = "give the study file, if the command has this option: --study STUDY"
         raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
-        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+        study = subset_of(study, store.sampling)
     study = _at_point(store, study)
     differing = differing_keys(store.identity, study.identity())
     if differing:
@@ -247,20 +247,9 @@ def differing_keys(in_file: Mapping[str, Any], wanted: Mapping[str, Any]) -> lis
     return lines
 
 
-def design_of(store: Reader, unfinished: bool) -> Design:
-    """Sampling design of a file: the first that recognises how its joints were drawn.
-
-    Parameters
-    ----------
-    store : Reader
-        The file.
-    unfinished : bool
-        Whether joints are pending; replicates are then unequal, and do not count as such.
-    """
-    sampling, skip = store.sampling, store.first_sample
-    method, n = str(sampling["method"]), store.n - skip
-    if sampling.get("joints_per_lot", 1) > 1:
-        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
-    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
-        return Replicated(n, int(sampling["replicates"]), method)
+def design_of(store: Reader) -> Design:
+    """Sampling design of a file: how its joints were drawn."""
+    method, size = str(store.sampling["method"]), int(store.sampling.get("joints_per_lot", 1))
+    if size > 1:
+        return Clustered(np.asarray(store.samples) // size)
     return Independent() if method == "random" else Listed(method)

@@ -310,7 +310,7 @@ class View:
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
-        return design_of(self.store, bool(self.count(Status.PENDING)))
+        return design_of(self.store)
 
     @property
     def sampled(self) -> bool:

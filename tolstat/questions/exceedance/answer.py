@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
+from tolstat.analysis.design import SAMPLE
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
@@ -77,8 +78,7 @@ def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
         When the joints are those of a sweep, or listed.
     """
     if view.method in ("sweep", "cases"):
-        remedy = 'give the result file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise shares.inapplicable(view, "its joints are no sample of a production", remedy)
+        raise shares.inapplicable(view, "its joints are no sample of a production", SAMPLE)
     parts = [*limit_tables(view, accepted), *quantile_tables(view), *_pictures(view), Sentence(note(view))]
     return Answer("exceedance", TITLE, parts)
 
@@ -166,7 +166,7 @@ def quantiles(view: View) -> Answer:
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise shares.inapplicable(view, "has no sample of valid loads", "simulate more joints")
     title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
-    title = title if view.design.has_intervals else "Quantiles"
+    title = title if view.design.is_sample else "Quantiles"
     return Answer("quantiles", "Quantiles", [_quantiles(view, title, True)])
 
 
@@ -247,9 +247,9 @@ def _beyond(view: View) -> str:
 
 def _how(view: View, accepted: float) -> Iterator[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.design.has_intervals:
+    if not view.design.is_sample:
         yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
-        yield text.sentence(view.design.without_interval("share"))
+        yield "The joints are no sample of a production: a share has no interval."
         return
     yield (
         f"Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "

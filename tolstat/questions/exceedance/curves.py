@@ -58,7 +58,7 @@ def _panel(view: View, panel: LoadPanel) -> Panel:
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), panel.unit)
         x = f"x: largest {panel.quantity} over the revolution [{unit or '1'}]"
         ax.set(xlabel=x, ylabel="share of joints above x")
-        if view.design.has_intervals:
+        if view.design.is_sample:
             end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
             look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
             ax.axhline(end, **look, label="upper end where none exceeds x")

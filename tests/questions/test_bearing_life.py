@@ -278,7 +278,8 @@ def test_verdicts_on_the_required_life():
     assert lasting(required, 0.02).sentence == f"Not kept: 5.5 % {what} ({interval}); 2 % is accepted"
     joints = text.number(needed(11 / 200, 0.05))
     assert lasting(required, 0.05).sentence == (
-        f"Open: 5.5 % {what} ({interval}); 5 % is accepted; {joints} joints would decide it"
+        f"Open: 5.5 % {what} ({interval}); 5 % is accepted; {joints} joints decide it in 90 % of campaigns "
+        "if 5.5 % is the true share"
     )
     plain = lasting(required, np.nan)
     assert (plain.answer, plain.sentence) == ("", f"5.5 % {what} ({interval})")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import LOOK_CONFIDENCE, clopper_pearson
 from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.loads import FloatArray
 
@@ -74,6 +74,10 @@ class Design:
         with np.errstate(invalid="ignore"):  # NaN without joints
             return np.asarray(x.above(levels) / np.float64(x.n))
 
+    def level(self, confidence: float) -> float:
+        """Confidence level with which intervals are computed, for them to hold with `confidence`; by default that."""
+        return confidence
+
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """Return the design of some of the joints; by default the same."""
         return self
@@ -119,7 +123,7 @@ class Independent(Design):
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""
-        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, confidence))
+        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, self.level(confidence)))
 
     def delivery(
         self, lower: Column, upper: Column, level: float, number: int, confidence: float
@@ -127,7 +131,18 @@ class Independent(Design):
         """See `Design.delivery`; exact (Thatcher 1964)."""
         at = np.array([level])
         least, most = int(lower.above(at)[0]), int(upper.above(at)[0])
-        return prediction.of_counts(least, most, upper.n, number, confidence)
+        return prediction.of_counts(least, most, upper.n, number, self.level(confidence))
+
+
+class Looked(Independent):
+    """Joints drawn one by one until a stop rule ended the campaign: intervals hold after any number of its looks."""
+
+    interval = f"Clopper–Pearson's of {100 * LOOK_CONFIDENCE:g} %, valid after any number of looks"
+    covers = "bands: pointwise 95 % intervals of the settled joints, valid after any number of looks"
+
+    def level(self, confidence: float) -> float:
+        """See `Design.level`: an interval of one look misses less often, as at a stop (`binomial.LOOK_CONFIDENCE`)."""
+        return 1.0 - (1.0 - confidence) * (1.0 - LOOK_CONFIDENCE) / 0.05
 
 
 class Listed(Design):

@@ -157,7 +157,9 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         rows = stores[0].campaign_rows
-        document = stores[0].metadata.model_copy(update={"stop": {}, "first_row": 0, "n": rows})
+        looks = sorted({look for store in stores for look in store.stop.get("looks", ())})  # they stay looks
+        stop = {"reached": False, "looks": looks} if looks else {}
+        document = stores[0].metadata.model_copy(update={"stop": stop, "first_row": 0, "n": rows})
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tolstat.campaign import replay as replays
     from tolstat.campaign import verify as checks
     from tolstat.campaign import work as works
-    from tolstat.common import columns, strict, tables, units
+    from tolstat.common import counts, strict, tables, units
     from tolstat.common import loads as load_units
     from tolstat.display import answer as answers
     from tolstat.display import rewording, style, table, text
@@ -39,8 +39,8 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("columns", "loads", "strict", "tables", "units")
-    columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
+    names = ("counts", "loads", "strict", "tables", "units")
+    counts, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
     names = ("answer", "rewording", "style", "table", "text")
     answers, rewording, style, table, text = (Late(f"tolstat.display.{name}") for name in names)
     names = ("accuracy", "joints", "drawings.answer", "drawings.dimensions", "exceedance.answer", "fatigue.loads")

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from tolstat.analysis import binomial
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
@@ -56,14 +57,14 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
 
-def _deciding(row: table.Row, accepted: float) -> str:
-    """Words on the number of simulated joints whose interval excludes the accepted share, those without a load too."""
+def _deciding(row: table.Row, accepted: float, level: float = CONFIDENCE) -> str:
+    """Words on the number of simulated joints that decide, those without a load too."""
     low, high = row["bound_lower"], row["bound_upper"]
     if not np.isnan(row["numerical_lower"]):
         part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
-    return deciding((low, high), accepted, lambda end: binomial.needed(end, accepted))
+    return deciding((low, high), accepted, row["n"], lambda share: binomial.needed(share, accepted, level))
 
 
 def _judged(view: View, records: Sequence[table.Row], accepted: float, standing: Standing | None) -> Verdict:
@@ -100,7 +101,7 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
         words = f"at most {most} exceed {limit} ({share}, {interval}){behind}"
     else:
         if answer == "open" and view.design.independent:
-            words += f"; {_deciding(row, accepted)}"
+            words += f"; {_deciding(row, accepted, view.design.level(CONFIDENCE))}"
         words += f". {behind}" if behind else ""
     missing = sentences.not_varied(standing, view.path.name)
     return value, words + (f"; {missing}" if missing else "")

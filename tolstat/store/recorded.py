@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent, Listed
+from tolstat.analysis.design import Design, Independent, Listed, Looked
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
@@ -252,4 +252,6 @@ def design_of(store: Reader) -> Design:
     method, size = str(store.sampling["method"]), int(store.sampling.get("joints_per_lot", 1))
     if size > 1:
         return Clustered(np.asarray(store.samples) // size)
-    return Independent() if method == "random" else Listed(method)
+    if method != "random":
+        return Listed(method)
+    return Looked() if store.stop else Independent()

@@ -167,8 +167,6 @@ def bars(standing: variations.Standing) -> Panel:
 
 FURTHER = 4
 """Largest number of joints of a variation whose first joints leave it open, in multiples of theirs."""
-MARGIN = 1.2
-"""Factor on the number of joints that would just decide a variation."""
 
 
 def simulate(
@@ -255,7 +253,7 @@ def _further(view: View, accepted: float, n: int) -> tuple[list[variations.Varia
     """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
     standing = variations.evaluate(view, accepted)
     second = (1.0 + standing.confidence) / 2.0
-    needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
+    needed = {row["label"]: binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
     by_label = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
     return [by_label[label] for label in numbers], math.ceil(max(numbers.values(), default=n))

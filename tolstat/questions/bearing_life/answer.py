@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.analysis.binomial import needed
 from tolstat.analysis.rating_life import A1, FRETTING
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -193,7 +194,12 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
-    judged = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), "", undecided)
+    level = lives.view.design.level(CONFIDENCE)
+
+    def deciding(share: float) -> float:
+        return needed(share, accepted, level)
+
+    judged = on_share("bearing life", what, row, ends, accepted, deciding, "", undecided)
     return [judged._replace(notes=tuple(_at_points(lives)))]
 
 

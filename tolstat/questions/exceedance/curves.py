@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import simultaneous
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common.loads import LoadPanel, load_of, load_panels, panels
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
@@ -172,7 +172,7 @@ def leading_panel(view: View, name: str) -> Panel:
             return
         high, floor = _draw(ax, view, {0: load}, [other for other in view.loads(others) if other.valid.size])
         if view.design.independent:
-            table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
+            table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size, load.design.level(CONFIDENCE))
             for end in (table["bound_upper"] + half, table["bound_lower"] - half):
                 line = _step(ax, table, end, floor, color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
                 drawing.switched(line, "curve-band")

@@ -10,7 +10,9 @@ from typing import Annotated
 import numpy as np
 
 from tolstat.analysis import binomial, prediction, strength
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.channels import signals_of, unit_of
+from tolstat.common.counts import POWER
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.mechanism import Mechanism
@@ -227,8 +229,10 @@ def _verdict(about: str, what: str, row: Row, joints: counting.Joints, accepted:
     def joints_needed(end: float) -> float:
         if "count" in row:
             return binomial.needed(end, accepted)
-        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
+        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small; nine
+        # in ten means are nearer than 1.28 standard errors, of which half an interval has 1.96
         distance = row["upper"] - share if share < accepted else share - row["lower"]
+        distance *= 1.0 + float(binomial.half_width(2.0 * POWER - 1.0) / binomial.half_width(CONFIDENCE))
         return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
 
     lost = math.isnan(share) or (without and without / row["n"] >= 0.5 * (row["upper"] - row["lower"]))

@@ -380,7 +380,7 @@ def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
         "histograms",
         "provenance",
     ]
-    assert text.count(">no verdict<") == 8
+    assert text.count(">no verdict<") == 6  # of loads whose numbers all agree one row
 
 
 @pytest.mark.slow

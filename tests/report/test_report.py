@@ -19,7 +19,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Status
 from tolstat.display import style
-from tolstat.display.table import fitted
+from tolstat.display.table import alike, fitted
 from tolstat.joint.derived import DERIVED
 from tolstat.questions import sweep
 from tolstat.questions.exceedance import answer as exceedance
@@ -58,6 +58,16 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
     assert "with unresolved joints" in fitted(exceedance.LIMITS, table.to_dict("records"), None)[0]
     assert "with unresolved joints" not in fitted(exceedance.LIMITS, rows.limit_rows(view()), None)[0]
+
+
+def test_loads_share_a_row_only_where_all_numbers_agree_as_printed():
+    first = rows.limit_rows(view())[0]
+    near, more = {**first, "nominal": first["nominal"] * (1.0 + 1e-7)}, {**first, "count": first["count"] + 1}
+    far = {**first, "nominal": 1.01 * first["nominal"]}
+    named = [{**row, "load": load} for row, load in zip((first, near, more, far), "abcd", strict=True)]
+    shown = alike(named, exceedance.LIMITS)
+    assert [row["load"] for row in shown] == ["a, b", "c", "d"]
+    assert shown[0]["nominal"] == first["nominal"]
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():

@@ -105,6 +105,15 @@ def by_share(rows: Rows, *keys: str) -> Rows:
     return list(grouped.values())
 
 
+def alike(rows: Rows, columns: Sequence[Column]) -> Rows:
+    """Rows whose cells all agree but for the ``load`` as one, with the names of all loads; other rows as they are."""
+    grouped: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        cells = tuple(column.cell({**row, "load": ""}) for column in columns if column.shown(rows))
+        grouped.setdefault(cells, []).append(row)
+    return [{**same[0], "load": ", ".join(row["load"] for row in same)} for same in grouped.values()]
+
+
 def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], rank: int = 0) -> list[Column]:
     """Columns of the rows of `by_share`, one a share: ``99 % reach``; the last one is never left out, see `Column`."""
 

@@ -12,9 +12,8 @@ from tolstat.common.tables import VALID, Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table
 from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row, by_share, has, has_unresolved
+from tolstat.display.table import Column, Row, alike, by_share, has, has_unresolved
 from tolstat.display.verdict import WORDS
-from tolstat.joint.perturbation import one_force
 from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
@@ -134,9 +133,7 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
     if any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for other, row in zip(others, rows, strict=True)):
         title = "What makes the shares above limits uncertain, in per cent of the joints"
-        parts.append(
-            Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate", view.mechanism))
-        )
+        parts.append(Table("uncertainty", title, BUDGET, rows, seen=alike(rows, BUDGET)))
     return Answer("limits", "Each limit", parts)
 
 
@@ -177,14 +174,13 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     rows, is_judged = of.limit_rows(view), not math.isnan(accepted)
     if is_judged:
         rows = [{**row, "verdict": WORDS[of.verdict(row, accepted)]} for row in rows]
-    seen = one_force(rows, "level", "estimate", view.mechanism)
+    seen = alike(rows, LIMITS)
     verdicts = [of.verdict(row, accepted) for row in seen] if is_judged else ()
     tables = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
         columns = [LIMITS[0], LIMITS[2], *(Column(point, shares.share(point)) for point in view.points)]
-        seen = one_force(points, "level", view.points[0], view.mechanism)
-        tables.append(Table("at_points", title, columns, points, seen=seen))
+        tables.append(Table("at_points", title, columns, points, seen=alike(points, columns)))
     return tables
 
 

@@ -5,17 +5,20 @@ import re
 import numpy as np
 import pytest
 
+import tolstat
 from tests.support import reports, synthetic
 from tests.support.views import view
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
+from tolstat.campaign import remedy
 from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import Simulation, Status, tables
 from tolstat.display import text as texts
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
 from tolstat.display.verdict import WORDS
+from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, verdict
 from tolstat.report import headline, page
@@ -30,9 +33,9 @@ def study(n=60, method="random", text=ONE):
     return text.replace("n = 60", f'n = {n}\nmethod = "{method}"')
 
 
-def interfering(folder):
-    """36 of 61 joints whose pin is larger than its hole; none of the others is above the limit."""
-    path = synthetic.store(folder, study(61), simulated=0)
+def interfering(folder, errors=""):
+    """36 of 61 joints outside the model; none of the others is above the limit."""
+    path = synthetic.store(folder, study(61) + errors, simulated=0)
     results = synthetic.results(62)
     for name in tables(CARDAN).RESULT.names:
         if tables(CARDAN).RESULT[name].base.kind == "f":
@@ -117,6 +120,33 @@ def test_no_verdict_says_more_than_the_file(tmp_path, name):
 def test_without_an_accepted_share_the_yield_leads_where_its_interval_tells_something(tmp_path, name, sentence):
     said, _ = everywhere(MISLEADING[name][0](tmp_path), np.nan)
     assert said["sentence"] == sentence
+
+
+def test_joints_that_cannot_be_assembled_are_scrap_in_the_yield(tmp_path):
+    with ResultFile.open(interfering(tmp_path, '[errors]\n"pin1.diameter" = "1 mm"\n')) as store:
+        made = store.view()
+        row = shares.good(made)
+        assert (row["n"], row["count"], row["scrap"], row["n_failed"]) == (61, 36, 36, 0)
+        low, high = (float(end) for end in clopper_pearson(36, 61))
+        assert (row["good"], row["good_lower"], row["good_upper"]) == pytest.approx((25 / 61, 1.0 - high, 1.0 - low))
+        found, judged = headline.headline(made), headline.headline(made, 0.01)
+        assert found.sentence.startswith(
+            "41 % of the joints keep the limit (25 of 61, 36 cannot be assembled; total interval "
+        )
+        assert judged.words == "59 % of the joints have no result (36 of 61: a pin is larger than its hole)"
+        assert judged.notes[0].startswith("36 of 61: a pin is larger than its hole. Row 1: ")
+        (told,) = remedy.in_words(remedy.reasons(store, {"": store.status()}))
+        assert told.startswith("36 joints outside_model: a pin is larger than its hole: scrap in the yield\n  hint")
+        assert "36 of 61 joints cannot be assembled: scrap in yield" in str(tolstat.capability(made).parts)
+
+
+def test_a_verdict_begins_with_what_it_is_and_each_sentence_with_a_capital():
+    made = view(limits={"cross1.F": 600.0})  # the joint without errors exceeds it
+    found = headline.headline(made, 0.999)
+    assert found.answer == "yes"
+    assert re.match(
+        r"at most 99.9 % exceed 600 N on cross1\.F .*\. The joint without errors exceeds 600 N", found.words
+    )
 
 
 def test_joints_without_a_result_have_a_cause_and_a_remedy(tmp_path):

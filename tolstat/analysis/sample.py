@@ -252,6 +252,13 @@ class Sample:
         lower, upper = (end + np.nan_to_num(by[joints]) for end in ends)
         return replace(self, value=Column(self.values + by), inexact=Inexact(joints, lower, upper))
 
+    def with_scrap(self, joints: Mask) -> Sample:
+        """Return the load of the same joints, infinite for some without a valid load, (n,), which then count."""
+        (lost, lower, upper), kept = self.inexact, ~joints[self.inexact.joints]
+        inexact = Inexact(lost[kept], lower[kept], upper[kept])
+        value, status = np.where(joints, np.inf, self.values), np.where(joints, Status.OK, self.status)
+        return replace(self, value=Column(value), inexact=inexact, status=status.astype(np.uint8))
+
     def of_limit(self) -> Sample:
         """Return the ratio of load to limit of the same joints; its limit is 1."""
         assert self.limit is not None

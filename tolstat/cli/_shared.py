@@ -222,7 +222,7 @@ def _print_parts(answer: answers.Answer, wide: bool) -> None:
             echo(f"\n{part.title}\n{part.text}")
         elif isinstance(part, answers.Sentence):
             if part.place == "lead":
-                echo(part.text if wide else textwrap.fill(part.text, WIDTH))
+                echo(textwrap.fill(part.text, table.WIDE if wide else WIDTH))
                 first = False
             else:
                 say(part.text)

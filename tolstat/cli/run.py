@@ -188,7 +188,7 @@ def extend(
     with progress("drawing the errors"):
         plan = library.extend.extend(file, n, study_file)
     about(plan.wording)
-    say(f"{file}: extended to {n} joints")
+    say(f"{file}: extended to {library.text.several(n, 'joint')}")
     simulate(plan, file, workers=workers)
     conclude(file, report, wide)
 
@@ -251,7 +251,7 @@ def simulate(plan: library.studies.Study, path: Path, until: str | None = None, 
         look, end = outcome.look, "reached" if outcome.reached else "not reached"
         biased = f", {library.stop_rule.BIASED}: go by the interval" if outcome.reached else ""
         say(
-            f"{rule.text}: {end} with {look.joints} joints, {look.above} above, "
+            f"{rule.text}: {end} with {library.text.several(look.joints, 'joint')}, {look.above} above, "
             f"{look.n_unresolved} failed or not settled\n"
             f"{100 * library.stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after "
             "any number of looks, as those of the report are (failed and unsettled joints: below at its lower end, "
@@ -285,7 +285,8 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
 def _lines(prediction: library.plan.Plan) -> Iterator[str]:
     yield f"joints: {prediction.rows}" + (f", each at {', '.join(prediction.points)}" if all(prediction.points) else "")
     yield f"random numbers a joint: {prediction.dimensions}"
-    yield f"pilot: {prediction.pilot} joints, {prediction.failed} failed, {prediction.unsettled} not settled"
+    pilot = library.text.several(prediction.pilot, "joint")
+    yield f"pilot: {pilot}, {prediction.failed} failed, {prediction.unsettled} not settled"
     if prediction.fidelity:
         yield prediction.fidelity
     if rattle := prediction.reversals.joints:

@@ -141,9 +141,10 @@ def limit_rows(view: View, delivery: int = DELIVERY) -> Rows:
     Returns
     -------
     sequence of mapping
-        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
-        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
-        and, if known, the numerical error; ``ppk`` with its ends, ``needed``, see `analysis.capability.Performance`;
+        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above,
+        or ``scrap``); ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling,
+        unresolved joints and, if known, the numerical error; ``ppk`` with its ends, ``needed``, see
+        `analysis.capability.Performance`;
         ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the delivery. The last
         row, `ANY_LIMIT`, is for the largest ratio of load to limit of each joint. ``ppk`` is NaN where unresolved
         joints matter (`analysis.binomial.unresolved_matter`).
@@ -225,7 +226,8 @@ def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
         name, study = rows[0]["load"], f"{view.store.study_name}.toml"
         level = view.load(name).limit
         limit = f"{name} > {'LEVEL' if level is None else text.value(level, view.load(name).unit)}"
-        yield Sentence(f"one in more than {view.load(name).valid.size} joints is beyond these joints")
+        number = text.several(view.load(name).valid.size, "joint")
+        yield Sentence(f"one in more than {number} is beyond these joints")
         yield Sentence(f'rarer ones: tolstat rare {study} --limit "{limit}"')
 
 
@@ -240,12 +242,14 @@ def _notes(rows: Rows) -> Iterator[str]:
     """Definitions, unresolved joints, restrictions of the table of limits."""
     yield "Ppk is Ppu: limits are upper limits. It is not Cpk: no process is shown to be under control (ISO 22514-2)"
     first = rows[0]
+    if scrap := first["scrap"]:
+        yield f"{scrap} of {first['n']} joints cannot be assembled: scrap in yield, ppm and delivery, in no Ppk"
     if unresolved := first["n_failed"] + first["n_unsettled"]:
         of = f"{unresolved} of {first['n']} joints without a valid load"
         yield f"{of}: in the intervals of yield and ppm both ways, in no Ppk"
         if any(shares.unresolved_matter(row) for row in rows):
             yield "no Ppk where joints without a valid load make a share as uncertain as sampling does"
-    if first["n"] - unresolved < indices.LEAST:
+    if first["n"] - unresolved - scrap < indices.LEAST:
         words = f"Ppk needs {indices.LEAST} valid joints, its lower end {first['needed']}"
         yield f"{words}; fewer tell at most its upper end"
     elif any(row["ppk_lower"] == 0 for row in rows):

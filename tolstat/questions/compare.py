@@ -274,16 +274,16 @@ def _notes(
         yield f"limits left out: {', '.join(apart)}, which only one file keeps"
     a, b = map(len, both.samples)
     if both.paired:
-        yield f"{a} pairs of joints with the same random numbers"
+        yield f"{text.several(a, 'pair')} of joints with the same random numbers"
         pairs, cases = len({row["row"] for row in switched}), f"{len(switched)} such cases, limit by limit"
         yield f"{pairs} pairs have a limit that only one of their joints exceeds; {cases}"
         yield from _tests(shares)
     else:
-        yield f"{a} and {b} joints with different random numbers"
+        yield f"{a} and {text.several(b, 'joint')} with different random numbers"
     each = [Counts.of(view.status[joints]) for view, joints in zip(both.views, both.samples, strict=True)]
     if unresolved := sum(counts.failed + counts.unsettled for counts in each):
         bounds = "the bounds in JSON and CSV count them below, then above"
-        yield f"{unresolved} joints without a valid load: left out; {bounds}"
+        yield f"{text.several(unresolved, 'joint')} without a valid load: left out; {bounds}"
     if not both.has_intervals:
         yield NO_INTERVALS
 

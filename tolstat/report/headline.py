@@ -12,7 +12,7 @@ from tolstat.analysis import binomial
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
-from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
+from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID, Status
 from tolstat.display import table, text
 from tolstat.display.verdict import WORDS, Verdict, deciding
 from tolstat.questions import joints, shares
@@ -22,6 +22,7 @@ from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.fatigue import answer as fatigue
+from tolstat.store.recorded import MISFIT
 from tolstat.store.view import View
 
 
@@ -77,7 +78,8 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
         return Verdict(answer, WORDS[answer], _reason(view, [row]), notes)
     value, words = _sentence(view, row, accepted, answer, standing)
     if first := _without_errors(view):
-        words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
+        is_first = answer != "yes" and value == WORDS[answer]  # a verdict that holds begins with what holds
+        words = f"{first}. {text.capital(words)}" if is_first else f"{words}. {text.capital(first)}"
     if several and worst["count"]:
         alike = sum(record["estimate"] == worst["estimate"] for record in records) - 1
         others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
@@ -154,22 +156,28 @@ def _reason(view: View, records: Sequence[table.Row]) -> str:
     n = max(row["n"] for row in records)
     if any(map(shares.unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
-        return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
+        why = f": {MISFIT}" if view.misfits.sum() == lost else ""
+        return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n}{why})"
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 
 def _causes(view: View) -> Iterator[str]:
     """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
     state = max((*FAILED, *UNSETTLED), key=view.count)
-    if view.count(state):
-        words = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
+    if number := view.count(state):
+        scrap = state == Status.OUTSIDE_MODEL and view.misfits.sum() == number
+        words = f"{number} of {view.n}: {MISFIT}" if scrap else f"{number} {state.label}: {STATUS_TEXT[state]}"
         first = next((joint for joint in joints.without_load(view) if joint["status"] == state.label), None)
         yield f"{words}. Row {first['row']}: {first['remedy']}" if first else words
 
 
 def _pending(view: View) -> tuple[str, ...]:
     pending = view.counts.total - view.counts.done
-    return (f"{pending} of {view.counts.total} joints are still pending",) if pending else ()
+    return (
+        (f"{pending} of {text.several(view.counts.total, 'joint')} {'is' if pending == 1 else 'are'} still pending",)
+        if pending
+        else ()
+    )
 
 
 SAMPLES = 1000

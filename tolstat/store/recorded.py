@@ -20,7 +20,7 @@ from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
-from tolstat.store.hdf5 import pick, store_error
+from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, points, subset_of
 from tolstat.study.design import KEYS
@@ -140,6 +140,17 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
         first = int(rows[here][0])
         params[here] = perturb(joint_of(store, first), operation_of(store, first), errors[here])
     return params
+
+
+MISFIT = "a pin is larger than its hole"
+"""Why a joint of `misfits` has no result."""
+
+
+def misfits(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Which of the joints in file slots `rows`, ascending, cannot be assembled, (m,): see `MISFIT`."""
+    parts = (rows[first : first + BLOCK] for first in range(0, len(rows), BLOCK))
+    none = np.zeros(0, dtype=bool)
+    return np.concatenate([none, *((parameters(store, part)["clearance"] < 0.0).any(axis=1) for part in parts)])
 
 
 def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) -> NDArray[np.void]:

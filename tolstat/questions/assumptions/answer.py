@@ -103,7 +103,9 @@ def assumptions_on_page(view: View, asked: Asked) -> Answer:
 def _answer(view: View, standing: variations.Standing) -> Answer:
     """Table, notes and facts."""
     most = max(row["n"] for row in standing.rows)
-    each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
+    each = f"{text.several(standing.n, 'joint')} of each" + (
+        f", {most} of those left open" if most > standing.n else ""
+    )
     bases = {row["n"]: text.percent(row["drawn"]) for row in standing.rows}
     told = ", ".join(f"{drawn} of {n}" for n, drawn in bases.items())
     title = f"Share above a limit with other values, and its change; {each}"
@@ -241,7 +243,7 @@ def simulate(
             run(further, number)
             run(variations.all_together(View(store)), n)
         if simulation.simulated:
-            done = f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s"
+            done = f"simulated {text.several(simulation.simulated, 'joint')} in {time.monotonic() - begin:.0f} s"
             more = f", {number} of {', '.join(variation.label for variation in further)}" if further else ""
             work.tell(f"{done}, {n} of each of {len(labels)} variations{more}")
         else:

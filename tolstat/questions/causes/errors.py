@@ -19,7 +19,7 @@ from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import VALID
-from tolstat.display import drawing, style
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
 from tolstat.questions import shares
@@ -241,10 +241,10 @@ def _notes(of_errors: Indices, command: str, shown: int) -> list[str]:
         alone += f", of which the {number} not shown {share} % (without effect they scatter about 0 %)"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
     level = "at least one limit" if facts["load"] == ANY_LIMIT else f"{facts['level']:.5g} {unit}".rstrip()
-    tail = f"; tail: {facts['above']} joints above {level}"
+    tail = f"; tail: {text.several(facts['above'], 'joint')} above {level}"
     notes = [
-        f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
-        f"standard deviation {std}",
+        f"{facts['load']}: {text.several(facts['joints'], 'joint')}, {facts['without_load']} without a valid load left "
+        f"out; standard deviation {std}",
         f"{alone}{tail}",
     ]
     if (used := facts["used"]) < facts["joints"]:

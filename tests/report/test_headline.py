@@ -140,13 +140,16 @@ def test_joints_that_cannot_be_assembled_are_scrap_in_the_yield(tmp_path):
         assert "36 of 61 joints cannot be assembled: scrap in yield" in str(tolstat.capability(made).parts)
 
 
-def test_a_verdict_begins_with_what_it_is_and_each_sentence_with_a_capital():
-    made = view(limits={"cross1.F": 600.0})  # the joint without errors exceeds it
-    found = headline.headline(made, 0.999)
-    assert found.answer == "yes"
-    assert re.match(
-        r"at most 99.9 % exceed 600 N on cross1\.F .*\. The joint without errors exceeds 600 N", found.words
-    )
+def test_a_verdict_that_holds_begins_with_what_holds_and_each_sentence_with_a_capital():
+    def change(results):
+        results["F_max"][:, 0] -= 100.0
+
+    made = view(limits={"cross1.F": 630.0}, change=change)  # the joint without errors exceeds it
+    kept, missed = (headline.headline(made, accepted) for accepted in (0.5, 0.001))
+    first, second = r"at most 50 % exceed 630 N on cross1\.F .*", "The joint without errors exceeds 630 N"
+    assert (kept.answer, missed.answer) == ("yes", "no")
+    assert re.match(rf"{first}\. {second}", kept.words)
+    assert missed.words.startswith("the joint without errors exceeds 630 N on cross1.F (640 N). ")
 
 
 def test_joints_without_a_result_have_a_cause_and_a_remedy(tmp_path):

@@ -69,11 +69,6 @@ def shares(lower: str, upper: str) -> Cell:
     return lambda row: text.span(row[lower], row[upper])
 
 
-def between(key: str) -> Cell:
-    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, in per cent without the unit."""
-    return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
-
-
 def value(key: str) -> Cell:
     """Make a `Column.cell` of a load, in the row's ``unit``."""
     return lambda row: text.value(row[key], row["unit"])

@@ -55,7 +55,6 @@ STATISTICS = {
     "difference of quantiles": Statistic("`compare`", ABOUT, "few joints: infinite ends"),
     "difference of means": Statistic("`compare`", MEANS),
     "index alone": Statistic("`causes`", ABOUT, "fewer than 50 joints"),
-    "index in all": Statistic("`causes`: bounds", LEAST, "fewer than 50 joints"),
     "index alone, exchanged": Statistic("`causes --run`", ABOUT, EXCHANGED),
     "index in all, exchanged": Statistic("`causes --run`", ABOUT, EXCHANGED),
     "index of the event": Statistic("`causes --run`", ABOUT, "no joint, or every joint, above the limit"),

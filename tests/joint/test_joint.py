@@ -22,7 +22,7 @@ from tolstat.common.strict import validate
 from tolstat.common.tables import tables
 from tolstat.joint import Joint, Operation, ideal, material
 from tolstat.joint.contact import LAWS
-from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, one_force
+from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 
 PARAM, ERROR_FIELDS = tables(CARDAN).PARAM, tables(CARDAN).error_fields
 PINS, HOLES = features(CARDAN)[:4], features(CARDAN)[4:]
@@ -397,21 +397,6 @@ def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
 @pytest.mark.parametrize("law", LAWS)
 def test_each_contact_law_has_a_line_in_the_table_of_the_model(law):
     assert f"\n| `{law}` | " in (files.docs_dir() / "model.md").read_text(encoding="utf-8")
-
-
-def test_of_limits_on_one_force_the_one_exceeded_most_is_shown_with_all_names():
-    fork = f"fork{HOLE_OF_PIN[0]}.F"  # of the arm in whose hole pin 1 turns
-    shares = {"cross1.F": 0.2, fork: 0.3, "pin1.contact": 0.1, "cross1.F at start": 0.4, "cross1.T": 0.0}
-    rows = [{"load": load, "level": 700.0, "share": share} for load, share in shares.items()]
-    other = {"load": "cross2.F", "level": 700.0, "share": 0.3}
-    shown = one_force([*rows, other, {**rows[0], "level": 800.0}], "level", "share", CARDAN)
-    assert [(row["load"], row["level"], row["share"]) for row in shown] == [
-        (f"cross1.F, {fork}, pin1.contact", 700.0, 0.3),
-        ("cross1.F at start", 700.0, 0.4),
-        ("cross1.T", 700.0, 0.0),
-        ("cross2.F", 700.0, 0.3),
-        ("cross1.F", 800.0, 0.2),
-    ]
 
 
 def test_equal_joints_of_a_shaft_turn_the_output_evenly(joint):

@@ -19,7 +19,6 @@ from tolstat import __version__
 from tolstat.cli._library import (
     answers,
     assumptions,
-    design,
     mounting,
     pool,
     recorded,
@@ -223,7 +222,7 @@ def _print_parts(answer: answers.Answer, wide: bool) -> None:
             echo(f"\n{part.title}\n{part.text}")
         elif isinstance(part, answers.Sentence):
             if part.place == "lead":
-                echo(part.text if wide else textwrap.fill(part.text, WIDTH))
+                echo(textwrap.fill(part.text, table.WIDE if wide else WIDTH))
                 first = False
             else:
                 say(part.text)
@@ -314,7 +313,7 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
     These are mounting and contact law; notes on measured signals and joints; warnings of its joints, of values that are
-    probably not meant, shares without an interval, and a note where rigid shafts meet errors along them.
+    probably not meant, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
     for note in study.notes:
@@ -328,5 +327,3 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
     print_warnings_of_joint2(path, study)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if study.sampling.replicates == 1 and (reason := design.without_interval(study.sampling.method)):
-        warn(f"warning: {reason}")

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.cardan import ARM_QUARTERS, PIN_QUARTERS
-from tolstat.common.loads import split
 from tolstat.common.mechanism import OBLIQUE, Mechanism, prefixes
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.tables import FACTORS, blank_params, tables
@@ -283,35 +281,3 @@ def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> A
     clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + deviation
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
     return np.asarray(clearance)
-
-
-@cache
-def _pin_of_load(mechanism: Mechanism) -> dict[str, str]:
-    """Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
-    pin_of_lump = {lump: pair.pin for pair in mechanism.pairs for lump in (pair.pin, pair.hole)}
-    forces = {f"{b.name}.F": pin_of_lump[b.lump] for b in mechanism.bushings if b.lump in pin_of_lump}
-    return forces | {f"{pair.pin}.contact": pair.pin for pair in mechanism.pairs}
-
-
-def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str, mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Rows of limits for people: one for all loads that are the same force and have the same limit.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Rows with ``load``, the key `level` of the limit, and the key `size`.
-    level, size : str
-        Of the rows of one force, that of the largest `size` is shown, with the names of all in ``load``.
-    mechanism : Mechanism
-        Whose loads they are.
-    """
-    by_force: dict[Any, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        name, points = split(row["load"])
-        pin = _pin_of_load(mechanism).get(name)
-        force = row["load"] if pin is None else (pin, points, row[level])
-        by_force.setdefault(force, []).append(row)
-    return [
-        {**max(same, key=lambda row: row[size]), "load": ", ".join(row["load"] for row in same)}
-        for same in by_force.values()
-    ]

@@ -69,11 +69,6 @@ def shares(lower: str, upper: str) -> Cell:
     return lambda row: text.span(row[lower], row[upper])
 
 
-def between(key: str) -> Cell:
-    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, in per cent without the unit."""
-    return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
-
-
 def value(key: str) -> Cell:
     """Make a `Column.cell` of a load, in the row's ``unit``."""
     return lambda row: text.value(row[key], row["unit"])
@@ -102,7 +97,8 @@ def estimated(
 
 def above(row: Row) -> str:
     """Cell of the joints above a limit, and of how many with a valid load."""
-    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+    scrap = row.get("scrap", 0)
+    return f"{row['count'] - scrap} of {row['n'] - row['n_failed'] - row['n_unsettled'] - scrap}"
 
 
 def limit(row: Row) -> str:
@@ -177,16 +173,19 @@ def grouped(reasons: Iterable[tuple[str, str]]) -> str:
 
 
 def good(view: View, name: str = ANY_LIMIT, delivery: int = DELIVERY) -> Mapping[str, Any]:
-    """Yield, joints above in a million and in the next delivery: the keys of `capability.limit_rows` but indices."""
+    """Yield, joints above, or scrap, in a million and in a delivery: keys of `capability.limit_rows` but indices."""
     return view.kept(("good", name, delivery), lambda: _good(view, name, delivery))
 
 
 def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
-    loads, above = error_budget.with_error(view, load), load.above(load.limit)
+    loads, scrap = error_budget.with_error(view, load), view.misfits
+    loads = tuple(each.with_scrap(scrap) for each in loads) if scrap.any() else loads
+    above = loads[0].above(load.limit)
     row: dict[str, Any] = {"load": load.name, "unit": load.unit, "limit": load.limit}
     row |= {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+    row |= {"scrap": int(scrap.sum())}
     share, low, high = above.estimate, *total_interval(loads, load.limit, CONFIDENCE)
     row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
     row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
@@ -219,6 +218,7 @@ def together(row: Row, limits: int) -> Yield:
     if kind == "bounds":
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
     span, counted = text.span(low, high), f"{valid - above} of {valid}{' with a valid load' if unresolved else ''}"
+    counted += f", {row['scrap']} cannot be assembled" if row["scrap"] else ""
     figure = text.percent(row["good"])
     if unresolved_matter(row):
         figure, interval = span, kind

@@ -320,6 +320,7 @@ def _cards(view: View, verdict: Verdict | None) -> list[Verdict]:
             cards.append(Verdict("", together.value, together.words, ("Yield",)))
         if (interval := text.ends(row["next_lower"], row["next_upper"], ".0f")) != "-":
             exceeded = "at least one limit" if len(view.limits) > 1 else "the limit"
+            exceeded += " or cannot be assembled" if row["scrap"] else ""
             predicted = f"of the next {row['delivery']} joints{view.design.of_delivery} exceed {exceeded}"
             cards.append(Verdict("", interval, predicted, ("95 % prediction interval",)))
     if verdict is not None and verdict.load and verdict.load not in verdict.words:

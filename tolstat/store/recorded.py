@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent, Listed, Replicated
+from tolstat.analysis.design import Design, Independent, Listed, Looked
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
@@ -20,7 +20,7 @@ from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
-from tolstat.store.hdf5 import pick, store_error
+from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
 from tolstat.study.design import KEYS
@@ -155,6 +155,17 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     return params
 
 
+MISFIT = "a pin is larger than its hole"
+"""Why a joint of `misfits` has no result."""
+
+
+def misfits(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Which of the joints in file slots `rows`, ascending, cannot be assembled, (m,): see `MISFIT`."""
+    parts = (rows[first : first + BLOCK] for first in range(0, len(rows), BLOCK))
+    none = np.zeros(0, dtype=bool)
+    return np.concatenate([none, *((parameters(store, part)["clearance"] < 0.0).any(axis=1) for part in parts)])
+
+
 def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) -> NDArray[np.void]:
     """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the joint and point of its variant."""
     return parameters_of(study, variants(study, rows), errors)
@@ -217,7 +228,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         remedy = "give the study file, if the command has this option: --study STUDY"
         raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
-        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+        study = subset_of(study, store.sampling)
     study = _at_point(store, study)
     differing = differing_keys(store.identity, study.identity())
     if differing:
@@ -261,20 +272,11 @@ def differing_keys(in_file: Mapping[str, Any], wanted: Mapping[str, Any]) -> lis
     return lines
 
 
-def design_of(store: Reader, unfinished: bool) -> Design:
-    """Sampling design of a file: the first that recognises how its joints were drawn.
-
-    Parameters
-    ----------
-    store : Reader
-        The file.
-    unfinished : bool
-        Whether joints are pending; replicates are then unequal, and do not count as such.
-    """
-    sampling, skip = store.sampling, store.first_sample
-    method, n = str(sampling["method"]), store.n - skip
-    if sampling.get("joints_per_lot", 1) > 1:
-        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
-    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
-        return Replicated(n, int(sampling["replicates"]), method)
-    return Independent() if method == "random" else Listed(method)
+def design_of(store: Reader) -> Design:
+    """Sampling design of a file: how its joints were drawn."""
+    method, size = str(store.sampling["method"]), int(store.sampling.get("joints_per_lot", 1))
+    if size > 1:
+        return Clustered(np.asarray(store.samples) // size)
+    if method != "random":
+        return Listed(method)
+    return Looked() if store.stop else Independent()

@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.analysis.binomial import needed
 from tolstat.analysis.rating_life import A1, FRETTING
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -193,8 +194,12 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
-    reason = lives.view.design.without_interval("share")
-    judged = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
+    level = lives.view.design.level(CONFIDENCE)
+
+    def deciding(share: float) -> float:
+        return needed(share, accepted, level)
+
+    judged = on_share("bearing life", what, row, ends, accepted, deciding, "", undecided)
     return [judged._replace(notes=tuple(_at_points(lives)))]
 
 
@@ -275,8 +280,6 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
-    if not lives.view.design.has_intervals:
-        yield shares.NO_INTERVALS
 
 
 def _draw(ax: Axes, lives: rating.Lives) -> None:
@@ -285,7 +288,7 @@ def _draw(ax: Axes, lives: rating.Lives) -> None:
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
-    drawing.curves(ax, x, {"": curve}, bands=int(lives.view.design.has_intervals), step="pre")
+    drawing.curves(ax, x, {"": curve}, bands=1, step="pre")
     style.share_axis(ax, floor)
     nominal = float(lives.nominal_hours[-1])
     ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]

@@ -26,7 +26,7 @@ def make(folder: Path) -> Path:
     errors["operation.alpha"] = [0.5, 2.5, -0.5]
     path = folder / PRESENT
     rows = np.arange(3)
-    with Writer.create(path, study, [errors], fakes.specs_of("full"), {"pin1.offset_e": 0}) as store:
+    with Writer.create(path, study, [errors], fakes.specs_of("full")) as store:
         params = fakes.perturb(study.joint, study.operation, errors)
         store.write(rows, fakes.simulate(params, fakes.Options(), "full", 0))
         store.finish()

@@ -153,7 +153,7 @@ def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str)
     study = tmp_path / "study.toml"
     sections = {"joint": 'base = "cirelli2021"', "sampling": "n = 8"}
     operation = '[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
-    written = [block for block in blocks(DOCS / page, "toml") if not block.startswith("[shaft]")]
+    written = [block for block in blocks(DOCS / page, "toml") if not block.startswith("[shaft")]
     operation = "" if any(block.startswith("[[operation]]") for block in written) else operation
     own = [operation, *written, f"[{added}]\n{sections[added]}"]
     tables = [block for block in own if block.startswith("[tolerances]")]
@@ -165,13 +165,13 @@ def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str)
     assert len(tables) >= (3 if page == "tolerances.md" else 1)
 
 
-def test_the_block_of_a_drive_shaft_makes_a_study() -> None:
-    (block,) = (block for block in blocks(DOCS / "study.md", "toml") if block.startswith("[shaft]"))
+def test_the_blocks_of_a_drive_shaft_make_a_study() -> None:
+    shaft, joint2 = (block for block in blocks(DOCS / "study.md", "toml") if block.startswith("[shaft"))
     study = tomllib.loads((ROOT / "studies" / "shaft.toml").read_text(encoding="utf-8"))
-    assert (
-        tolstat.load(study | tomllib.loads(block)).mechanism
-        == MECHANISMS["splined shaft+thrust+friction+input_bearings+output_bearings"]
-    )
+    for block, radius in ((shaft, None), (f"{shaft}\n{joint2}", 0.05)):
+        made = tolstat.load(study | tomllib.loads(block))
+        assert made.mechanism == MECHANISMS["splined shaft+thrust+friction+input_bearings+output_bearings"]
+        assert (made.operation.joint2 and made.operation.joint2.cross.R) == radius
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 """Draw the errors of a study's joints, before any of them is simulated.
 
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
-others are drawn with it, and not on other errors that are added to the study later. One exception: `lhs` has as many
-strata as joints. Joints that share a lot have the same scores of the lot, whose number follows from i.
+others are drawn with it, and not on other errors that are added to the study later. Joints that share a lot have the
+same scores of the lot, whose number follows from i.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import SUBSET
 from tolstat.common.late import special
-from tolstat.common.mechanism import Mechanism
-from tolstat.common.tables import tables
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
-from tolstat.study.design import KEYS, Design, sobol
+from tolstat.study.design import KEYS, Design
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.zone_laws import plane_scores
 
@@ -63,13 +61,9 @@ def draw(study: Study, rows: range | None = None) -> Table:
 
 
 def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
-    """Draw `rows` of a study as tables of at most `BLOCK` rows, one after the other.
-
-    A Latin hypercube is drawn as one table, because its permutations go over all joints.
-    """
-    size = len(rows) if study.sampling.method == "lhs" else BLOCK
-    for first in range(0, len(rows), size):
-        yield draw(study, rows[first : first + size])
+    """Draw `rows` of a study as tables of at most `BLOCK` rows, one after the other."""
+    for first in range(0, len(rows), BLOCK):
+        yield draw(study, rows[first : first + BLOCK])
 
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
@@ -188,14 +182,6 @@ def streams(study: Study) -> list[str]:
     return list(dict.fromkeys(stream for name in study.tolerances for stream in axes.streams_of(name)))
 
 
-def dimensions(mechanism: Mechanism) -> dict[str, int]:
-    """Sobol' dimension of each error: its position in the table ERROR, whichever errors scatter in a study.
-
-    A new error changes the Sobol' draws of all others: SciPy's scrambling depends on the number of dimensions.
-    """
-    return {field.name: number for number, field in enumerate(tables(mechanism).error_fields)}
-
-
 def _fill_grid(samples: Table, study: Study, numbers: range) -> None:
     """Set the points of the product grid of the axes, the last of which varies fastest; dimensions are no errors."""
     index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in study.sweep])
@@ -265,26 +251,9 @@ def _fill_from(samples: Table, study: Study, u: dict[str, Array], of_lots: Mappi
 
 def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, Array]:
     """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each."""
-    seed, n, first = study.sampling.seed, len(numbers), numbers.start
-    if study.sampling.method in ("sobol", "lhs"):
-        size = study.samples // study.sampling.replicates
-        ends = range(first // size * size, numbers.stop, size)
-        parts = [_design(names, study, i // size, range(max(first, i) - i, min(numbers.stop - i, size))) for i in ends]
-        return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
     # a stream may give 0 itself, once in 2^53 draws
-    return {name: np.maximum(_stream(seed, name, first).random(n), 2.0**-54) for name in names}
-
-
-def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) -> dict[str, Array]:
-    """Sobol' points, or points of a Latin hypercube, of one replicate; the first is that of a study without others."""
-    seed, n = study.sampling.seed, study.samples // study.sampling.replicates
-    if study.sampling.method == "sobol":
-        column = dimensions(study.mechanism)
-        points = sobol(len(numbers), len(column), [seed, replicate] if replicate else seed, numbers.start)
-        return {name: points[:, column[name]] for name in names}
-    suffix = f" {replicate}" if replicate else ""
-    here = slice(numbers.start, numbers.stop)
-    return {name: _stratified(n, _stream(seed, f"lhs {name}{suffix}"))[here] for name in names}
+    drawn = {name: _stream(study.sampling.seed, name, numbers.start).random(len(numbers)) for name in names}
+    return {name: np.maximum(u, 2.0**-54) for name, u in drawn.items()}
 
 
 def _probability(scores: Array) -> Array:
@@ -303,9 +272,3 @@ def _stream(seed: int, name: str, first: int = 0) -> np.random.Generator:
     stream = np.random.Generator(bits)
     stream.random(within)
     return stream
-
-
-def _stratified(n: int, stream: np.random.Generator) -> Array:
-    """One value in each of n equal intervals, in random order (Latin hypercube of one dimension)."""
-    u = (stream.permutation(n) + stream.random(n)) / n
-    return np.clip(u, 2.0**-54, 1 - 2.0**-53)

@@ -41,8 +41,8 @@ from scipy.spatial.transform import Rotation
 
 from studies.cirelli2021.rccc_statics import INPUT_PIN, OUTPUT_PIN, Lines, output_load, react
 from tolstat.joint import Joint, Operation, ideal, perturb
+from tolstat.joint.bodies import PIN_TRIADS
 from tolstat.joint.material import Array
-from tolstat.joint.perturbation import PIN_TRIADS
 
 CLOSED = 1e-12
 """A loop is closed when all components of its gap are below this, in rad and in units of ``cross.R``."""

@@ -23,9 +23,8 @@ PACKAGES = ("tolstat", "numba", "numpy", "scipy", "scikit-sundae", "exudyn")
 
 def parameters(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Draw the joints of some rows of a study, in any order; (m,) PARAM."""
-    whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
-    first, end = (0, study.rows) if whole else (int(rows.min()), int(rows.max()) + 1)
-    errors = sampling.draw(study, range(first, end))[rows - first]
+    first = int(rows.min())
+    errors = sampling.draw(study, range(first, int(rows.max()) + 1))[rows - first]
     return perturbed(study, rows, errors)
 
 

@@ -72,18 +72,31 @@ def test_simultaneous_band_holds_the_whole_curve_and_the_pointwise_one_does_not(
     assert binomial.simultaneous(0) == 1.0
 
 
+def deciding(share, accepted, n, seeds=20_000):
+    """Share of simulated campaigns of n joints whose interval excludes the accepted share."""
+    above = np.random.default_rng(2025).binomial(n, share, seeds)
+    lower, upper = binomial.clopper_pearson(above, n)
+    return np.mean((upper <= accepted) | (lower > accepted))
+
+
 @pytest.mark.parametrize(
-    ("share", "accepted"), [(0.0, 0.001), (0.03, 0.05), (0.08, 0.05), (0.0484, 0.05), (0.02, 0.01), (1.0, 0.5)]
+    ("share", "accepted"),
+    [(0.05, 0.1), (0.0999, 0.11), (0.005, 0.01), (0.008, 0.01), (0.05, 0.04), (0.12, 0.1), (0.3, 0.1), (0.97, 0.99)],
 )
-def test_joints_needed_are_the_first_whose_interval_tells(share, accepted):
-    n = binomial.needed(share, accepted)
-    told = []
-    for number in (n - 1, n):
-        lower, upper = binomial.clopper_pearson(share * number, number)
-        told.append(bool(upper <= accepted or lower > accepted))
-    assert told == [False, True]
-    assert n > 100 or share == 1.0  # less than one joint above in all tells nothing
-    assert binomial.needed(accepted, accepted) == np.inf
+def test_nine_campaigns_of_ten_decide_with_the_joints_that_are_needed(share, accepted):
+    n = int(binomial.needed(share, accepted))
+    assert 0.88 <= deciding(share, accepted, n) <= 0.93
+    assert deciding(share, accepted, int(0.8 * n)) < 0.88
+    half = int(binomial.needed(share, accepted, power=0.5))
+    assert 0.48 <= deciding(share, accepted, half) <= 0.6
+
+
+def test_where_no_joint_or_each_is_above_one_campaign_tells():
+    for share, accepted in ((0.0, 0.001), (1.0, 0.5)):
+        n = binomial.needed(share, accepted)
+        ends = [binomial.clopper_pearson(share * number, number) for number in (n - 1, n)]
+        assert [bool(upper <= accepted or lower > accepted) for lower, upper in ends] == [False, True]
+    assert binomial.needed(0.1, 0.1) == np.inf
 
 
 @pytest.mark.parametrize(("count", "n"), [(0, 61), (2, 14), (38, 395)])

@@ -10,7 +10,6 @@ from tolstat.analysis import ranks, sensitivity
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
 ISHIGAMI_FIRST = np.array([0.313905, 0.442411, 0.0])
-ISHIGAMI_TOTAL = np.array([0.557589, 0.442411, 0.243684])
 """Closed form for a = 7, b = 0.1 (Homma and Saltelli 1996)."""
 SLOPES = np.array([0.7, 0.5, -0.3, 0.0])
 
@@ -35,19 +34,17 @@ def share_explained(x, y):
 @pytest.fixture(scope="module")
 def found():
     rng = np.random.default_rng(1991)
-    first, bounds, naive = [], [], []
+    first, naive = [], []
     for _ in range(SEEDS):
         x, y = ishigami(1000, rng)
-        alone, in_all = sensitivity.first_and_total(x, y)
-        first.append(alone)
-        bounds.append(in_all)
+        first.append(sensitivity.first_order(x, y))
         naive.append(share_explained(x, y))
-    return first, bounds, np.array(naive)
+    return first, np.array(naive)
 
 
 @pytest.mark.slow
 def test_first_order_indices_cover_and_are_not_biased(found):
-    first, _, naive = found
+    first, naive = found
     lower, upper, estimate = (np.array([getattr(f, e) for f in first]) for e in ("lower", "upper", "estimate"))
     covered = ((lower <= ISHIGAMI_FIRST) & (upper >= ISHIGAMI_FIRST)).mean(axis=0)
     assert np.all(covered >= LEAST)
@@ -58,37 +55,12 @@ def test_first_order_indices_cover_and_are_not_biased(found):
     assert np.mean(np.abs(naive[:, 2] - ISHIGAMI_FIRST[2]) <= half) < LEAST
 
 
-@pytest.mark.slow
-def test_total_indices_lie_between_their_bounds_and_first_order_indices_do_not(found):
-    first, bounds, _ = found
-    lower, upper = (np.array([getattr(b, end) for b in bounds]) for end in ("lower", "upper"))
-    assert np.all(((lower <= ISHIGAMI_TOTAL) & (upper >= ISHIGAMI_TOTAL)).mean(axis=0) >= LEAST)
-    assert np.mean(upper - lower) < 0.2
-    wrong = np.array([f.upper[2] for f in first])
-    assert np.mean(wrong >= ISHIGAMI_TOTAL[2]) < LEAST
-    pairs = np.mean([b.pairs for b in bounds], axis=0)
-    assert pairs[0, 2] == pytest.approx(0.2437, abs=0.04)
-    assert abs(pairs[0, 1]) < 0.005
-    assert np.mean([b.rest for b in bounds]) < 0.05
-
-
-def test_an_effect_of_three_errors_is_in_the_bounds():
-    """x1 x2 x3 has no effect of one or two: every total index is 1, all of it rest."""
-    x = np.random.default_rng(2).standard_normal((2000, 4))
-    _, bounds = sensitivity.first_and_total(x, x[:, 0] * x[:, 1] * x[:, 2])
-    assert bounds.rest == pytest.approx(1.0, abs=0.15)
-    assert np.all(bounds.upper[:3] > 0.9)
-    assert np.all(bounds.estimate < 0.15)
-
-
 def test_linear_model_has_the_shares_of_its_slopes():
     x, y = linear(20_000, np.random.default_rng(5))
     shares = SLOPES**2 / (SLOPES @ SLOPES)
-    first, total = sensitivity.first_and_total(x, y)
+    first = sensitivity.first_order(x, y)
     assert first.estimate == pytest.approx(shares, abs=0.012)
-    assert total.rest == pytest.approx(0.0, abs=0.01)
-    for one, other in zip(sensitivity.first_order(x, y), first, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-10)
+    assert first.additive[0] == pytest.approx(1.0, abs=0.01)
 
 
 def test_few_joints_give_an_error_without_effect_no_share_on_average_and_without_correction_they_do():
@@ -122,8 +94,6 @@ def test_errors_of_few_values_and_of_one_value():
     found = sensitivity.first_order(x, 2.0 * x[:, 0] + x[:, 1])
     assert found.estimate[:2] == pytest.approx([0.5, 0.5], abs=0.05)
     assert np.isnan(found.estimate[2])
-    with pytest.raises(ValueError, match="scatter"):
-        sensitivity.first_and_total(x, x[:, 1])
 
 
 def test_a_load_that_does_not_scatter_has_no_indices():
@@ -213,6 +183,6 @@ def test_exchanging_the_sides_of_a_limit_mirrors_the_interval():
 
 def test_dependent_samples_have_no_interval():
     x, y = linear(300, np.random.default_rng(6))
-    ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.first_and_total(x, y, iid=False)[1].upper]
+    ends = [sensitivity.first_order(x, y, iid=False).lower]
     ends.append(ranks.tail(x, y > 0.8, iid=False).size.upper)
     assert np.isnan(ends).all()

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from tests.support import stops
-from tolstat.analysis import binomial
+from tolstat.analysis import binomial, capability, difference
+from tolstat.analysis.design import Independent, Looked
+from tolstat.analysis.sample import Sample
 
 PLANS = [
     (0.2, 500),
@@ -113,3 +115,21 @@ def test_looks_grow_slowly_and_those_taken_stay() -> None:
     before = binomial.looks(301)
     assert set(before) <= set(binomial.looks(1000, taken=before))
     assert 301 not in binomial.looks(1000)
+
+
+def test_every_interval_of_a_campaign_with_looks_is_that_of_a_look() -> None:
+    """Share, quantile, Ppk, delivery and differences of one file say the same."""
+    rng = np.random.default_rng(8)
+    values, others = rng.normal(size=(2, 2000))
+    alone, looked = (Sample.of(values, np.ones(2000), design) for design in (Independent(), Looked()))
+    share, count = looked.above(2.0), int((values > 2.0).sum())
+    lower, upper = binomial.clopper_pearson(count, 2000, binomial.LOOK_CONFIDENCE)
+    assert (share.lower, share.upper) == (pytest.approx(float(lower)), pytest.approx(float(upper)))
+    assert looked.quantile(0.9) == alone.quantile(0.9, binomial.LOOK_CONFIDENCE)
+    assert looked.delivery(2.0, 500) == alone.delivery(2.0, 500, binomial.LOOK_CONFIDENCE)
+    index, wide = capability.of_sample(looked, 4.0), capability.of_sample(alone, 4.0, binomial.LOOK_CONFIDENCE)
+    assert index.ppk == wide.ppk
+    second = Sample.of(values + 0.1 * others, np.ones(2000))
+    for paired in (True, False):
+        own, plain = (difference.shares(sample, second, [1.0], paired) for sample in (looked, alone))
+        assert own.lower[0] < plain.lower[0] < plain.upper[0] < own.upper[0]

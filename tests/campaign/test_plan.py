@@ -16,12 +16,13 @@ from tests.support.of_cardan import LOADS, Limit
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
 from tolstat.analysis import binomial
-from tolstat.campaign import plan, stop_rule
+from tolstat.analysis.design import Looked
+from tolstat.campaign import extend, plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Status
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, View, Writer
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
@@ -137,10 +138,35 @@ def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
         assert not store.stop["reached"]
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("few_looks")
+def test_a_file_has_the_interval_that_is_valid_after_any_number_of_looks(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    look = stopped(path).look
+    with ResultFile.open(path) as store:
+        share = View(store).load("cross1.F").above(0.5)
+        assert (share.outer_lower, share.outer_upper) == pytest.approx((look.lower, look.upper))
+        assert "valid after any number of looks" in View(store).design.interval
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reached", [True, False])
+def test_looks_go_with_a_file_that_is_extended_or_merged(tmp_path: Path, reached: bool) -> None:
+    path = synthetic.store(tmp_path, name="a")
+    with Writer.open(path) as store:
+        store.change(stop={"reached": reached, "looks": [20, 30]})
+    extend.merge([path], tmp_path / "b.h5")
+    extend.extend(path, 90)
+    for held in (path, tmp_path / "b.h5"):
+        with ResultFile.open(held) as store:
+            assert store.stop == {"reached": False, "looks": [20, 30]}
+            assert isinstance(View(store).design, Looked)
+
+
 def test_until_is_for_independent_samples(tmp_path: Path) -> None:
-    (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
+    (tmp_path / "s.toml").write_text(synthetic.SWEEP, encoding="utf-8")
     loaded = study.load(tmp_path / "s.toml")
-    with pytest.raises(InputError, match=r"sampling\.method is 'sobol': .* independent samples"):
+    with pytest.raises(InputError, match=r"sampling\.method is 'sweep': .* independent samples"):
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE, {}, CARDAN), lambda row: None)
 
 
@@ -188,6 +214,14 @@ def test_the_default_pilot_takes_few_joints_that_are_slow(small: study.Study, mo
     assert plan.plan(small, pilot=40).pilot == 10
     assert sizes == [8, 10]
     assert plan.plan(small, pilot=12).pilot == 12  # as many as are asked for
+
+
+def test_a_plan_tells_the_joints_that_decide_an_accepted_share(small: study.Study) -> None:
+    assert plan.plan(small, pilot=2).deciding == {}
+    assert plan.plan(small, pilot=2, accepted=0.01).deciding == {0.005: 3205.0, 0.008: 23599.0}
+    lots = dataclasses.replace(small, sampling=small.sampling.model_copy(update={"joints_per_lot": 2}))
+    with pytest.raises(InputError, match="--accept: numbers of joints are known for independent joints only"):
+        plan.plan(lots, pilot=2, accepted=0.01)
 
 
 def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: study.Study) -> None:

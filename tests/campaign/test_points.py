@@ -229,10 +229,10 @@ def test_simulated_joints_at_three_points_equal_those_of_three_studies(tmp_path:
 def test_why_joints_have_no_load_is_said_once_for_all_points():
     outside, failed = Status.OUTSIDE_MODEL, Status.NEWTON_FAILED
     reasons = [
-        Reason(outside, 5, 2, "check the units", "low"),
-        Reason(failed, 4, 6, "failed at step 3", "mid"),
-        Reason(outside, 3, 4, "check the units", "high"),
-        Reason(failed, 1, 7, "failed at step 9", "low"),
+        Reason(outside, 5, 2, "check the units", "why", "low"),
+        Reason(failed, 4, 6, "failed at step 3", "other", "mid"),
+        Reason(outside, 3, 4, "check the units", "why", "high"),
+        Reason(failed, 1, 7, "failed at step 9", "other", "low"),
     ]
     first, second = in_words(reasons)
     head, hint = first.splitlines()
@@ -241,6 +241,6 @@ def test_why_joints_have_no_load_is_said_once_for_all_points():
     head, *hints = second.splitlines()
     assert head.startswith("4 joints newton_failed at mid, 1 at low: ")
     assert hints == ["  hint, for row 6 at mid: failed at step 3", "  hint, for row 7 at low: failed at step 9"]
-    (alone,) = in_words([Reason(failed, 1, 7, "failed at step 9")])
+    (alone,) = in_words([Reason(failed, 1, 7, "failed at step 9", "other")])
     assert alone.startswith("1 joint newton_failed: ")
     assert alone.endswith("\n  hint, for row 7: failed at step 9")

@@ -327,10 +327,6 @@ def test_another_number_of_joints_is_an_extension_of_the_file(study):
     fewer = call("run", study, "--n", 3, "--workers", 1)
     assert "hint: read it as it is: tolstat report small.h5, or give another file: --out OTHER.h5" in fewer.stderr
     assert Path("small.h5").read_bytes() == before
-    study.write_text(synthetic.STUDY.replace("seed = 2021", 'method = "lhs"'), encoding="utf-8")
-    call("run", study, "--n", 5, "--workers", 1, "--no-report", "--out", "lhs.h5")
-    strata = call("run", study, "--workers", 1, "--out", "lhs.h5")
-    assert "hint: give another file: --out OTHER.h5; a Latin hypercube has as many strata" in strata.stderr
 
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from tolstat.display import text
+from tolstat.display.table import Column, fitted
 from tolstat.display.unseen import visible
 
 
@@ -58,3 +59,20 @@ def test_shares_below_one_in_a_billion_are_no_more_than_that(share, shown):
     assert text.percent(share) == shown
     assert text.span(1e-40, 0.5) == "0 .. 50 %"
     assert text.span(-0.02, 0.5) == "-2 .. 50 %"
+
+
+def test_a_wide_table_fits_160_characters():
+    columns = [Column(head, lambda row, head=head: row[head], words=True) for head in ("name", "since", "keys")]
+    rows = [
+        {"name": "a", "since": 40 * "since it is so ", "keys": 30 * "key = 1, "},
+        dict.fromkeys(("name", "since", "keys"), "b"),
+    ]
+    shown, missing = fitted(columns, rows, None)
+    assert max(map(len, shown.splitlines())) <= 160
+    assert missing == ""
+    assert shown.split().count("since") == 41
+    assert fitted(columns, rows[1:], None)[0] == "name  since  keys\nb     b      b"
+
+
+def test_one_thing_is_not_several():
+    assert [text.several(n, "joint") for n in (0, 1, 2)] == ["0 joints", "1 joint", "2 joints"]

@@ -18,27 +18,6 @@ FIT = (
 )
 """Edits of a study: without offsets, and with a fit."""
 
-SOBOL = Campaign(
-    "sobol",
-    [
-        cheap("iso2768_f"),
-        "run iso2768_f.toml --n 96 --set sampling.method=sobol --set sampling.replicates=8 --out sobol.h5",
-        "run iso2768_f.toml --n 64 --set sampling.method=sobol --out one.h5",
-    ],
-    usual("sobol.h5")
-    | {
-        "one": ["report one.h5", "capability one.h5 --json", "extend one.h5 --n 128"],
-        "extend": ["extend sobol.h5 --n 192", "extend sobol.h5 --n 100"],
-    },
-)
-LHS = Campaign(
-    "lhs",
-    [
-        cheap("iso2768_f"),
-        "run iso2768_f.toml --n 64 --set sampling.method=lhs --set sampling.replicates=8 --out lhs.h5",
-    ],
-    usual("lhs.h5") | {"extend": ["extend lhs.h5 --n 128"], "compare": ["compare lhs.h5 lhs.h5 --json"]},
-)
 PARTS = Campaign(
     "known_parts",
     ["run known_parts.toml --n 96"],

@@ -124,6 +124,15 @@ TRUCK = Campaign(
         "bearing_life": ["bearing-life shaft.h5"],
     },
 )
+UNLIKE = Campaign(
+    "unlike_joints",
+    ["run unlike_joints.toml --n 24"],
+    {
+        "show": ["show unlike_joints.toml"],
+        "page": ["report unlike_joints.h5 --out page.html --accept '60 %'"],
+        "change": ["change unlike_joints.h5 --set shaft.joint2.base=cirelli2021"],
+    },
+)
 RINGS = Campaign(
     "snap_rings",
     ["run snap_rings.toml --n 24"],

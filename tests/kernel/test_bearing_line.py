@@ -39,8 +39,8 @@ def parameters(offset: float) -> np.recarray:
     par.at[0] = par.marker[0, :, 1] = [(0.2 * (i - 2), 0.0, 0.0) for i in NUMBERS]
     par.k[0, :, :3], par.k[0, :, 3:], par.c[0, :, :3], par.c[0, :, 3:] = 1e8, 1e5, 500.0, 1.0
     par.c_d, par.c_t, par.delta_d, par.clearance = 500.0, 5.0, 1e-6, 1e-5
-    par.n_stations, par.station_s[0, :2], par.station_weight[0, :2] = 2, (0.01, -0.01), 0.5
-    par.station_k1[0, :2], par.station_k2[0, :2] = 1e13, 2e8
+    par.n_stations, par.station_s[0, 0, :2], par.station_weight[0, 0, :2] = 2, (0.01, -0.01), 0.5
+    par.station_k1[0, 0, :2], par.station_k2[0, 0, :2] = 1e13, 2e8
     par.pin_axis[:] = par.hole_axis[:] = (0.0, 0.0, 1.0)
     par.hole_point[0, 1, 0] = offset
     return par

@@ -42,16 +42,16 @@ def contacts_alone(params, random_errors, law):
 def stations_of(par, q, v, work):
     """Columns of all stations, (4, n, columns)."""
     dynamics.forces(0.0, q, v, par, work)
-    return work.station[:, : par.n_stations].copy()
+    return work.station[:, : par.n_stations[0]].copy()
 
 
 def potential(par, q, work):
     """Elastic energy of the contact stations, J, from penetrations alone: the integral of each station's force."""
     delta = np.maximum(stations_of(par, q, np.zeros(N_DOF), work)[:, :, DELTA], 0.0)
-    n = par.n_stations
-    lost = par.needle_b * par.clearance[:, None] + 1e-12
-    needles = par.station_k3[:n] * delta**2.625 * 8 / 21 / np.sqrt(lost) * hyp2f1(0.5, 21 / 8, 29 / 8, -delta / lost)
-    return float((par.station_k1[:n] * delta**3 / 3 + par.station_k2[:n] * delta**2 / 2 + needles).sum())
+    n = par.n_stations[0]
+    lost = par.needle_b[0] * par.clearance[:, None] + 1e-12
+    needles = par.station_k3[0, :n] * delta**2.625 * 8 / 21 / np.sqrt(lost) * hyp2f1(0.5, 21 / 8, 29 / 8, -delta / lost)
+    return float((par.station_k1[0, :n] * delta**3 / 3 + par.station_k2[0, :n] * delta**2 / 2 + needles).sum())
 
 
 def generalised(q, work):

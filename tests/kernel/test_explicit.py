@@ -45,19 +45,19 @@ def test_steps_are_stable_up_to_the_limit(share: float) -> None:
 
 def of_needles(par: np.record, pin: int, j: int, depth: float) -> float:
     """Force (N) of the needles at a station."""
-    return float(par.station_k3[j] * depth**1.625 / np.sqrt(depth + par.needle_b * par.clearance[pin] + 1e-30))
+    return float(par.station_k3[0, j] * depth**1.625 / np.sqrt(depth + par.needle_b[0] * par.clearance[pin] + 1e-30))
 
 
 def force_of(par: np.record, pin: int, j: int, depth: float) -> float:
     """Force (N) of a station."""
-    return float(par.station_k1[j] * depth**2 + par.station_k2[j] * depth) + of_needles(par, pin, j, depth)
+    return float(par.station_k1[0, j] * depth**2 + par.station_k2[0, j] * depth) + of_needles(par, pin, j, depth)
 
 
 def slope_of(par: np.record, pin: int, j: int, depth: float) -> float:
     """Slope of the force of a station, N/m; of needles by differences."""
     h = 1e-4 * depth + 1e-12
     rise = of_needles(par, pin, j, depth + h) - of_needles(par, pin, j, max(depth - h, 0.0))
-    return float(2 * par.station_k1[j] * depth + par.station_k2[j]) + rise / (h + min(h, depth))
+    return float(2 * par.station_k1[0, j] * depth + par.station_k2[0, j]) + rise / (h + min(h, depth))
 
 
 def dense(h: float, depth: float, par: np.record) -> np.ndarray:
@@ -84,10 +84,10 @@ def dense(h: float, depth: float, par: np.record) -> np.ndarray:
             add(lump, base, *torques, k[3 + i], c[3 + i])
     for pin, pair in enumerate(CARDAN.pairs):
         e, *across = triads()[body(pair.pin)]
-        for j in range(par.n_stations):
-            slope, c = slope_of(par, pin, j, depth), par.c_d * par.station_weight[j]
+        for j in range(par.n_stations[0]):
+            slope, c = slope_of(par, pin, j, depth), par.c_d[0] * par.station_weight[0, j]
             for axis in across:
-                along = np.r_[axis, np.cross(par.station_s[j] * e, axis)]
+                along = np.r_[axis, np.cross(par.station_s[0, j] * e, axis)]
                 add(body(pair.pin), body(pair.hole), along, along, slope, c)
     for i, lump in enumerate(CARDAN.lumps):
         kind = lump_kind(lump.kind)

@@ -109,12 +109,12 @@ def halve_all(record):
     for pin in range(4):
         for k in range(3):
             lanes.pin_axis[pin, k] = where(lanes.R > 1, lanes.R, lanes.pin_axis[pin, k])
-    return lanes.n_stations
+    return lanes.n_stations[0]
 
 
 def test_records_are_read_and_written_lane_by_lane():
     record = aligned_zeros(1, lane_dtype(PARAM)).view(np.recarray)[0]
-    record.R[:], record.n_stations, record.pin_axis[...] = np.arange(WIDTH), 2, -1.0
+    record.R[:], record.n_stations[:], record.pin_axis[...] = np.arange(WIDTH), 2, -1.0
     assert halve_all(record) == 2
     np.testing.assert_array_equal(record.R, 0.5 * np.arange(WIDTH))
     np.testing.assert_array_equal(record.pin_axis[3, 2], np.where(record.R > 1, record.R, -1.0))

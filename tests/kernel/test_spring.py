@@ -16,32 +16,32 @@ from tolstat.kernel.revolution.outcome import inside_model
 @pytest.mark.parametrize("clearance", [0.0, 1e-6, 1e-4])
 def test_slope_and_inverse(params, law, clearance):
     par = with_law(params(), law)[0]
-    for j in range(par.n_stations):
+    for j in range(par.n_stations[0]):
         for delta in np.geomspace(1e-10, 1e-3, 15):
-            force, slope = elastic(j, delta, clearance, has_needles(par), par)
+            force, slope = elastic(0, j, delta, clearance, has_needles(0, par), par)
             h = 1e-5 * delta
-            ends = [elastic(j, delta + s * h, clearance, has_needles(par), par)[0] for s in (1, -1)]
+            ends = [elastic(0, j, delta + s * h, clearance, has_needles(0, par), par)[0] for s in (1, -1)]
             assert slope == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-8)
-            assert penetration(force, j, clearance, par) == pytest.approx(delta, rel=1e-10)
+            assert penetration(force, 0, j, clearance, par) == pytest.approx(delta, rel=1e-10)
 
 
 @pytest.mark.parametrize("clearance", [0.0, 1e-5])
 def test_inverse_of_needles_beside_other_springs(params, clearance):
     """No law has both, but the inverse holds for them."""
     par = with_law(params(), "needles")[0]
-    par.station_k1[0], par.station_k2[0] = 1e12, 1e8
+    par.station_k1[0, 0], par.station_k2[0, 0] = 1e12, 1e8
     for force in (1e-3, 1.0, 1e5):
         found = brentq(
-            lambda d, force=force: elastic(0, d, clearance, True, par)[0] - force, 1e-15, 1.0, xtol=1e-18, rtol=1e-13
+            lambda d, force=force: elastic(0, 0, d, clearance, True, par)[0] - force, 1e-15, 1.0, xtol=1e-18, rtol=1e-13
         )
-        assert penetration(force, 0, clearance, par) == pytest.approx(found, rel=1e-9)
+        assert penetration(force, 0, 0, clearance, par) == pytest.approx(found, rel=1e-9)
 
 
 def test_no_load_and_no_stiffness_need_no_penetration(params):
     par = with_law(params(), "needles")[0]
-    assert penetration(0.0, 0, 1e-5, par) == 0.0
-    par.station_k3[0] = 0.0
-    assert penetration(100.0, 0, 1e-5, par) == 0.0
+    assert penetration(0.0, 0, 0, 1e-5, par) == 0.0
+    par.station_k3[0, 0] = 0.0
+    assert penetration(100.0, 0, 0, 1e-5, par) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,14 @@ OPTIONS = Options()
 WHOLE = {"thrust": FACES | {"end_play": "0 mm"}, "friction": FRICTION, "shaft": FREE}
 ACROSS = {"lateral": "2e7 N/m", "mass": "5 kg", "unbalance": {"amount": "1e-3 kg*m", "angle": "30 deg"}}
 THROWN = TUBE | {"unbalance": {"amount": "2e-3 kg*m", "angle": "50 deg"}}
-MECHANISMS = pytest.mark.parametrize(
-    "drive", [None, drive_shaft(0.2, offset="0.1 rad", tube=THROWN)], ids=["joint", "shaft"]
+OTHER = joints.load(
+    "pin25",
+    {"thrust": {"end_play": "0 mm", "k": "6e7 N/m"}, "friction": {"mu": 0.06, "slip_speed": "0.02 m/s"}, "shaft": FREE},
+    "case.toml",
 )
+"""A smaller joint in needle bearings, with five stations a pin instead of three."""
+SHAFT, UNLIKE = (drive_shaft(0.2, offset="0.1 rad", tube=THROWN, **own) for own in ({}, {"joint2": OTHER}))
+MECHANISMS = pytest.mark.parametrize("drive", [None, SHAFT, UNLIKE], ids=["joint", "shaft", "unlike"])
 
 
 def state(seed: int, drive: joints.DriveShaft | None = None, turned: float = 5e-3, **sections):

@@ -1,9 +1,9 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``engine_order.h5``,
-``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or
-all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``unlike_joints.h5``,
+``engine_order.h5``, ``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and
+``line_bored.h5``, of some joints or all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
 """
 
 from __future__ import annotations
@@ -212,6 +212,12 @@ def shaft(folder: Path) -> None:
     of_shafts(folder, "shaft", ends, "input.bearing_a", "largest force of a bearing")
 
 
+def unlike_joints(folder: Path) -> None:
+    """Draw the largest force of a bearing at each end."""
+    ends = {"gearbox, needles": "input.bearing_?", "axle, plain bushes": "output.bearing_?"}
+    of_shafts(folder, "unlike_joints", ends, "input.bearing_a", "largest force of a bearing")
+
+
 def engine_order(folder: Path) -> None:
     """Draw the largest force on a pin of each joint."""
     joints = {"joint 1": "joint1.cross?.F", "joint 2": "joint2.cross?.F"}
@@ -348,6 +354,7 @@ def main(folder: Path) -> None:
         known_parts,
         lots,
         shaft,
+        unlike_joints,
         engine_order,
         statics,
         snap_rings,

@@ -320,7 +320,7 @@ def test_sentences_of_each_case(tmp_path, varied):
 
     opened = verdict(path, drawn + 0.002)
     assert opened.sentence.startswith(f"open: {shown(drawn)} exceed 700 N on cross1.F (")
-    assert "joints would decide it. Of 5 variations of what is assumed: kept in " in opened.sentence
+    assert "is the true share. Of 5 variations of what is assumed: kept in " in opened.sentence
 
 
 def test_a_verdict_that_nothing_turns_names_the_least_share(tmp_path, quick):

@@ -278,7 +278,8 @@ def test_verdicts_on_the_required_life():
     assert lasting(required, 0.02).sentence == f"Not kept: 5.5 % {what} ({interval}); 2 % is accepted"
     joints = text.number(needed(11 / 200, 0.05))
     assert lasting(required, 0.05).sentence == (
-        f"Open: 5.5 % {what} ({interval}); 5 % is accepted; {joints} joints would decide it"
+        f"Open: 5.5 % {what} ({interval}); 5 % is accepted; {joints} joints decide it in 90 % of campaigns "
+        "if 5.5 % is the true share"
     )
     plain = lasting(required, np.nan)
     assert (plain.answer, plain.sentence) == ("", f"5.5 % {what} ({interval})")
@@ -292,8 +293,6 @@ def test_no_verdict_on_the_required_life():
     assert found.values()["share"] is None
     assert lasting(1.0, 0.6, failed=100).answer == "yes"  # even if all joints without a life last shorter
     assert lasting(8e6, 0.1, alpha=0.01).sentence.startswith("No verdict: no bearing has a rating: every joint swings")
-    assert lasting(8e6, 0.1, method="sobol").answer == "none"
-    assert lasting(8e6, np.nan, method="sobol").answer == ""
     bearing = {key: value for key, value in BEARING.items() if key != "required_life"}
     made = view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
     assert question.life_verdicts(made) == []
@@ -325,12 +324,6 @@ def test_joints_loaded_at_one_end():
     assert table.loc["any", "along"] == 1.0
     notes = said(view(change=change), "note")
     assert any("In 15 % of the joints at least one bearing is loaded at one end only" in note for note in notes)
-
-
-def test_without_independent_joints_there_are_no_intervals():
-    table = below(lives_of(view(method="sobol")))
-    assert table[["lower", "upper", "total_lower", "total_upper"]].isna().all(axis=None)
-    assert "interval" not in said(view(method="sobol"))[0]
 
 
 def test_the_bearing_is_that_of_the_study_given_in_place_of_the_stored_one(tmp_path):

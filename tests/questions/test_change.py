@@ -226,8 +226,9 @@ def test_a_study_without_limits_has_quantiles(tmp_path: Path) -> None:
     }
 
 
-def test_a_campaign_of_another_design_is_compared_with_joints_drawn_at_random(tmp_path: Path) -> None:
-    path = made(tmp_path, TEXT.replace("seed = 3", 'seed = 3\nmethod = "lhs"'))
+def test_a_campaign_of_lots_is_compared_with_joints_drawn_at_random(tmp_path: Path) -> None:
+    text = TEXT.replace("seed = 3", "seed = 3\njoints_per_lot = 8")
+    path = made(tmp_path, text.replace('"normal"', '"normal", lot = { share = 0.5 }', 1))
     assert simulated(path, most=1024).startswith("simulated 2048 joints")
     assert answer(path).facts["n"] == 1024
 

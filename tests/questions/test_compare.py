@@ -109,7 +109,7 @@ def test_joints_without_a_load_are_bounds_and_dependent_samples_have_no_interval
     assert (found.n, found.estimate[0]) == (2, 0.5)
     assert (found.bound_lower[0], found.bound_upper[0]) == (0.5 - 0.5, 0.75 - 0.25)
     assert found.outer_lower[0] < 0.0 < found.bound_upper[0] < found.outer_upper[0]
-    one, other = (loads(values, Listed("sobol")) for values in (a, b))
+    one, other = (loads(values, Listed("cases")) for values in (a, b))
     assert np.isnan(difference.shares(one, other, [2.5], True).outer_upper[0])
     assert np.isnan(difference.quantiles(one, other, 0.5, True).lower)
     with pytest.raises(ValueError, match="no joint with a valid load"):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 import tolstat
 from tests.questions.test_fatigue_campaign import SCATTER
@@ -297,21 +298,22 @@ def test_verdicts_on_failures_in_the_service_life():
     assert (kept.share, kept.lower, kept.upper) == (share, low, high)
     assert judged(0.01)[0].sentence == f"Not kept: {text.percent(share)} {what} ({interval}); 1 % is accepted"
     accepted = 0.5 * (share + high)
-    joints = np.ceil(400 * ((row["upper"] - share) / (accepted - share)) ** 2)
+    wider = 1.0 + norm.ppf(0.9) / norm.ppf(0.975)
+    joints = np.ceil(400 * (wider * (row["upper"] - share) / (accepted - share)) ** 2)
     assert judged(accepted)[0].sentence == (
         f"Open: {text.percent(share)} {what} ({interval}); {text.percent(accepted)} is accepted; "
-        f"{text.number(joints)} joints would decide it"
+        f"{text.number(joints)} joints decide it in 90 % of campaigns if {text.percent(share)} is the true share"
     )
     assert judged(np.nan)[0].sentence == f"{text.percent(share)} {what} ({interval})"
 
 
 def test_an_open_verdict_is_decided_by_the_joints_that_it_asks_for():
-    """A campaign of that many joints has an interval that just excludes the accepted share, as far as its own share."""
+    """With that many joints the interval is so narrow that nine campaigns of ten decide; a quarter is too few."""
     _, row = judged(np.nan, n=400)
     accepted = row["estimate"] + 0.4 * (row["upper"] - row["estimate"])
     open_, _ = judged(accepted, n=400)
-    joints = int(float(re.search(r"; ([0-9.]+) joints would decide", open_.sentence)[1]))
-    shares = [judged(np.nan, n=number)[1] for number in (joints // 2, 2 * joints)]
+    joints = int(float(re.search(r"; ([0-9.]+) joints decide it in", open_.sentence)[1]))
+    shares = [judged(np.nan, n=number)[1] for number in (joints // 4, joints)]
     widths = [own["outer_upper"] - own["estimate"] for own in shares]
     assert widths[1] < accepted - row["estimate"] < widths[0]
 

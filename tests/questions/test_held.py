@@ -60,7 +60,7 @@ def simulate(params, options, mechanism, **kept) -> Simulation:
     results = without_results(len(params), Status.OK, mechanism)
     for name in (name for name in results.dtype.names if name.endswith(("_max", "_mean", "_range"))):
         results[name] = 100.0
-    of_pin = 0.1 * params["mu"] * np.maximum(np.abs(params["torque"] * params["omega"]), 1e3) / 4
+    of_pin = 0.1 * params["mu"][:, 0] * np.maximum(np.abs(params["torque"] * params["omega"]), 1e3) / 4
     results["loss_max"][:, :4], results["loss_max"][:, 4] = of_pin[:, None], 4 * of_pin
     results["bearing_a_balls_max"] = results["bearing_a_rollers_max"] = 10.0 * params["torque"][:, None]
     results["settled"] = 1

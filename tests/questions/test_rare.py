@@ -23,6 +23,7 @@ from tolstat.cli import app
 from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status, tables
+from tolstat.display.answer import Sentence
 from tolstat.questions import rare as module
 from tolstat.questions.rare import rare, seed_row
 from tolstat.store import ResultFile, Writer, metadata
@@ -390,3 +391,12 @@ def test_intervals_of_four_seeds_cover():
         module.together([walk_of(linear, 100, 2.5, 4 * k + i, 3).estimate() for i in range(4)])[0] for k in range(60)
     ]
     assert np.mean([one.lower < norm.sf(2.5) < one.upper for one in found]) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 60)
+
+
+@pytest.mark.slow
+def test_a_note_of_several_seeds_is_told_once(whole):
+    with ResultFile.open(whole[2]) as store:
+        said = [part.text for part in rare(store.view(), store.view()).parts if isinstance(part, Sentence)]
+    assert len([note for note in said if note.startswith("numerical error at the limit: not known")]) == 1
+    assert len([note for note in said if note.startswith("the estimate is as precise as")]) == 1
+    assert sum(note.startswith(f"{whole[2]}: ") for note in said) == 2

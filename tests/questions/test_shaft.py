@@ -84,6 +84,23 @@ def test_a_bearing_swings_by_the_misalignment_of_its_own_shaft(view):
     np.testing.assert_allclose(lives_of(straighter).hours[:, :4], lives_of(plain).hours[:, :4], rtol=1e-12)
 
 
+def test_bearings_are_those_of_the_joint_that_they_are_in(view):
+    """Twice the load rating is 2^(10/3) times the life; no rating of both is told where they differ."""
+    plain, unlike = view(), view()
+    held = joint.load("cirelli2021", {"bearing": BEARING | {"C": "44 kN", "required_life": "100 h"}}, "x.toml")
+    operation = unlike.store.operation
+    shaft = operation.shaft.model_copy(update={"joint2": held})
+    unlike.store.points = {"": Point("", operation.model_copy(update={"shaft": shaft}), 1.0)}
+    before, after = lives_of(plain), lives_of(unlike)
+    np.testing.assert_array_equal(after.hours[:, :4], before.hours[:, :4])
+    np.testing.assert_allclose(after.hours[:, 4:8], 2 ** (10 / 3) * before.hours[:, 4:8], rtol=1e-12)
+    assert [after.rating_of(place) for place in ("joint1.pin2", "joint1", "joint2")] == [22e3, 22e3, 44e3]
+    assert np.isnan(after.rating_of("shaft"))
+    assert before.rating_of("shaft") == 22e3
+    texts = list(shown(bearing_life.bearing_life(unlike)))
+    assert any("C = 22 and 44 kN" in text for text in texts)
+
+
 def test_a_shaft_has_no_rating_where_one_of_its_bearings_frets(view):
     lives = lives_of(view((15.0, 2.0)))
     rated = lives.hours[:, [0, 1, 2, 3, lives.places.index("joint1")]]
@@ -204,6 +221,26 @@ def test_a_shaft_is_drawn_as_a_whole(of_study):
     titles = [ax.get_title("left") for ax in drawings.draw_joint(of_study.joint, of_study.operation).axes]
     assert titles[:2] == ["The drive shaft, to scale", "The cross, seen from the output shaft"]
     assert titles[2:] == ["joint1: Both shafts", "joint2: Both shafts"]
+
+
+def test_a_joint_2_of_its_own_is_drawn_and_told(of_study):
+    held = joint.load("cirelli2021", {"thrust": {"end_play": "0.1 mm", "k": "1e8 N/m"}}, "x.toml")
+    shaft = of_study.operation.shaft.model_copy(update={"joint2": held})
+    operation = of_study.operation.model_copy(update={"shaft": shaft})
+    rows = dimensions.dimensions(of_study.joint, [Point("", operation, 1.0)])
+    values = {row["dimension"]: row["value"] for row in rows}
+    assert (values["joint1.cross.R"], values["joint2.cross.R"]) == ("43 mm", f"{1e3 * held.cross.R:.5g} mm")
+    assert (values["joint1.thrust.end_play"], values["joint2.thrust.end_play"]) == ("0.02 mm", "0.1 mm")
+    assert "joint1.shaft.input.bearings" in values
+    assert not {"cross.R", "joint1.shaft.output.bearings", "joint2.shaft.input.bearings"} & values.keys()
+    errors = nominal_errors(1, joint.mechanism_of(of_study.joint, operation))
+    errors["joint2.pin1.diameter"] = 1e-4
+    told = {row["feature"]: row for row in drawings.numbers(of_study.joint, errors, held)}
+    assert list(told["joint2.pin1"].values())[-1] == pytest.approx(1e3 * (held.contact.clearance - 5e-5))
+    assert len(drawings.draw_row(of_study.joint, errors, joint2=held).axes) >= 2
+    titles = [axes.get_title(loc="left") for axes in drawings.draw_joint(of_study.joint, operation).axes]
+    assert len(titles) == 5
+    assert [title.partition(":")[0] for title in titles if "The cross" in title] == ["joint1", "joint2"]
 
 
 def test_the_spline_carries_torque_and_not_only_bending(of_study):

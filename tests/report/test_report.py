@@ -19,7 +19,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import kinds
 from tolstat.common.tables import Status
 from tolstat.display import style
-from tolstat.display.table import fitted
+from tolstat.display.table import alike, fitted
 from tolstat.joint.derived import DERIVED
 from tolstat.questions import sweep
 from tolstat.questions.exceedance import answer as exceedance
@@ -40,7 +40,7 @@ def texts(figure):
 
 def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
     made = view(limits={"fork3.T": 18.0, "pin2.contact": 650.0, "psi": 1.1e-4})
-    table = exceedance.limits(made).frame("limits")
+    table = pd.DataFrame(rows.limit_rows(made))
     assert list(table["load"]) == ["fork3.T", "pin2.contact", "psi"]
     assert list(table["unit"]) == ["N*m", "N", "1"]
     assert list(table["count"]) == [
@@ -60,11 +60,21 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     assert "with unresolved joints" not in fitted(exceedance.LIMITS, rows.limit_rows(view()), None)[0]
 
 
+def test_loads_share_a_row_only_where_all_numbers_agree_as_printed():
+    first = rows.limit_rows(view())[0]
+    near, more = {**first, "nominal": first["nominal"] * (1.0 + 1e-7)}, {**first, "count": first["count"] + 1}
+    far = {**first, "nominal": 1.01 * first["nominal"]}
+    named = [{**row, "load": load} for row, load in zip((first, near, more, far), "abcd", strict=True)]
+    shown = alike(named, exceedance.LIMITS)
+    assert [row["load"] for row in shown] == ["a, b", "c", "d"]
+    assert shown[0]["nominal"] == first["nominal"]
+
+
 def test_dependent_samples_have_no_interval_and_the_note_says_why():
-    made = view(method="sobol", failed=2)
-    assert exceedance.limits(made).frame("limits")[["lower", "upper", "outer_upper"]].isna().all(axis=None)
-    assert exceedance.limits(made).frame("limits")["bound_upper"].notna().all()
-    assert "independent samples only" in exceedance.note(made)
+    made = view(method="cases", failed=2)
+    assert pd.DataFrame(rows.limit_rows(made))[["lower", "upper", "outer_upper"]].isna().all(axis=None)
+    assert pd.DataFrame(rows.limit_rows(made))["bound_upper"].notna().all()
+    assert "no sample of a production" in exceedance.note(made)
     assert "95 % band" not in texts(curves.sheet(made, []))
 
 
@@ -169,7 +179,7 @@ def test_a_campaign_without_a_valid_joint_still_gets_a_page(status):
     made = view(21, change=change)
     assert texts(curves.sheet(made, [])).count("no joint with a valid result") == 4
     assert not rows.curve_rows(made)
-    share = exceedance.limits(made).frame("limits")["estimate"]
+    share = pd.DataFrame(rows.limit_rows(made))["estimate"]
     assert share.isna().all()
     assert "-" in fitted(exceedance.LIMITS, rows.limit_rows(made))[0]
 
@@ -305,7 +315,7 @@ def test_colours_differ_for_dichromats():
 
 
 def test_values_of_the_joint_that_differ_from_the_one_that_comes_along():
-    file = SimpleNamespace(path="x.h5", joint=joint.load("cirelli2021", {}, "x").given("json"))
+    file = SimpleNamespace(path="x.h5", points={}, joint=joint.load("cirelli2021", {}, "x").given("json"))
     assert joint_values(file).text == "none: it is cirelli2021"
     file.joint = joint.load("cirelli2021", {"contact": {"clearance": "0.05 mm", "law": "point"}}, "x").given("json")
     rows = [line.split("  ") for line in joint_values(file).text.splitlines()]

@@ -82,5 +82,5 @@ def test_faults() -> None:
         study.load(Path("s.toml"), text=f"{HEAD}[tolerances]\n{offset}{pair}[sampling]\nn = 60\n")
     with pytest.raises(InputError, match="no tolerance has a lot"):
         made("", "")
-    with pytest.raises(InputError, match="joints_per_lot is given with 'sobol'"):
-        made(more='joints_per_lot = 20\nmethod = "sobol"')
+    with pytest.raises(InputError, match="n is given with 'sweep'"):
+        made(more='joints_per_lot = 20\nmethod = "sweep"')

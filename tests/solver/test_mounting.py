@@ -114,7 +114,7 @@ def test_closure_counts_what_a_slow_decay_has_ahead(params):
     """Changes of a geometric series: those ahead sum to rho / (1 - rho) of the last."""
     par = sliding(params(torque=1.0), 0.0, 2e4, 0.0)[0]
     stiffness = centring_stiffness(0, par)
-    assert stiffness == pytest.approx(1.0 / (2 * (par.R + par.station_s[0]) * 1e-4), rel=1e-12)
+    assert stiffness == pytest.approx(1.0 / (2 * (par.R + par.station_s[0, 0]) * 1e-4), rel=1e-12)
     expected = np.exp(-2 * np.pi / par.omega * stiffness / par.c_a)
     assert axial_decay(par) == pytest.approx(expected, rel=1e-12)
     notes = make_notes(1)[0]

@@ -85,7 +85,7 @@ def test_two_equal_joints_turn_the_output_evenly(params, fidelity):
     output = found.histories["tau"][0].astype(float) * slope
     near = 1e-6 if fidelity == Fidelity.IDEAL else 1e-3  # the elastic joint has an error Psi of its own
     np.testing.assert_allclose(output, 1.0, atol=near)
-    expected = pin_force(theta, alpha, torque, par.R[0] + par.station_s[0, 0])
+    expected = pin_force(theta, alpha, torque, par.R[0] + par.station_s[0, 0, 0])
     force = np.linalg.norm(found.histories["loads"][0, :, 0, :3].astype(float), axis=1)
     np.testing.assert_allclose(force, expected, rtol=1e-6 if fidelity == Fidelity.IDEAL else 2e-3)
 
@@ -96,7 +96,7 @@ def test_torque_orders_of_the_ideal_joint_at_rest(params):
     found = simulate_rows(par, Options(fidelity=int(Fidelity.IDEAL)), histories="full")
     phase = 2 * np.pi * np.arange(180) / 180
     torque = 100 + 60 * np.cos(2 * phase + 0.7)
-    expected = pin_force(phase, 20 * DEGREE, 1.0, par.R[0] + par.station_s[0, 0]) * torque
+    expected = pin_force(phase, 20 * DEGREE, 1.0, par.R[0] + par.station_s[0, 0, 0]) * torque
     force = np.linalg.norm(found.histories["loads"][0, :, 0, :3].astype(float), axis=1)
     np.testing.assert_allclose(force, expected, rtol=1e-5)
 

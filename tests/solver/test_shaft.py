@@ -11,9 +11,11 @@ import pytest
 from tests.conftest import REFERENCE, with_orders
 from tests.support.held import RPM, TUBE, drive_shaft, held
 from tests.support.statics import on_shafts
-from tolstat import sampling, study
-from tolstat.common.tables import SIMULATED, VALID, Options
+from tolstat import joint, sampling, study
+from tolstat.common.loads import loads_of
+from tolstat.common.tables import SIMULATED, VALID, Options, Status
 from tolstat.joint import perturb
+from tolstat.solver.reference import reference_rows
 from tolstat.solver.simulation import simulate_rows
 
 pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
@@ -73,26 +75,45 @@ def test_loss_and_loads_of_the_outer_shafts_are_those_of_the_reference(name: str
         assert result["lateral_orders_max"][:, 1] == pytest.approx(lateral[:, 2], rel=1e-2)
 
 
+PRELOADED = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}
+WIDER = PRELOADED | {
+    "thrust": {"end_play": "-0.004 mm", "k": "6e7 N/m"},
+    "cross": {"R": "95 mm"},
+    "contact": {"law": "point", "z": "30 mm", "clearance": "0.05 mm"},
+}
+"""Sections of two joints whose crosses a light preload holds; the second is wider and touches at two stations."""
+
+
+def of_file(sections) -> joint.Joint:
+    return joint.load("cirelli2021", sections, "case.toml")
+
+
 @pytest.mark.parametrize(
-    ("alphas", "arrangement", "plane", "offset"),
-    [((8, 8), "W", 0.0, 0.0), ((8, 6), "Z", np.pi, 0.0), ((12, 5), "50 deg", np.radians(50), 0.2)],
+    ("alphas", "arrangement", "plane", "offset", "own"),
+    [
+        ((8, 8), "W", 0.0, 0.0, {}),
+        ((8, 6), "Z", np.pi, 0.0, {}),
+        ((12, 5), "50 deg", np.radians(50), 0.2, {}),
+        ((12, 5), "50 deg", np.radians(50), 0.2, {"joint2": of_file(WIDER)}),
+    ],
 )
-def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: float, offset: float) -> None:
+def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: float, offset: float, own) -> None:
     """Forces and moments across the outer shafts, forces of pins at 20 rpm, within 1 %; a light preload holds crosses.
 
     Each pin takes M / 2 R' across it, with the couple M of its joint and R' the distance of the outer ends of holes.
     """
     first, second = np.radians(alphas)
-    shaft = drive_shaft(second, arrangement, offset=f"{offset} rad")
-    sections = SECTIONS | {"thrust": {"end_play": "-0.002 mm", "k": "1e8 N/m"}, "friction": {}}
-    rows, mechanism = held(alpha=first, speed=20 * RPM, drive_shaft=shaft, **sections)
+    shaft = drive_shaft(second, arrangement, offset=f"{offset} rad", **own)
+    rows, mechanism = held(alpha=first, speed=20 * RPM, drive_shaft=shaft, **PRELOADED)
     found = simulate_rows(rows, Options(max_refinements=0), "full", mechanism=mechanism)
     assert found.results["status"][0] in SIMULATED
     loads = found.histories["shafts"][0]
     expected = on_shafts(np.arange(180) * np.radians(2), (first, second), plane, offset, 1.2, 100.0)
-    names, radius = [bushing.name for bushing in mechanism.bushings], rows.R[0] + rows.station_s[0].max()
-    for joint, couple in enumerate(expected.couples.T):
-        of_pins = [names.index(f"joint{joint + 1}.cross{pin}") for pin in (1, 2, 3, 4)]
+    names = [bushing.name for bushing in mechanism.bushings]
+    for k, couple in enumerate(expected.couples.T):
+        kind = mechanism.lump_kinds.index(f"joint{k + 1}.pin")
+        radius = rows.at[0, kind, 0] + rows.station_s[0, k].max()
+        of_pins = [names.index(f"joint{k + 1}.cross{pin}") for pin in (1, 2, 3, 4)]
         pins = np.linalg.norm(found.histories["loads"][0][:, of_pins, 1:3], axis=2)
         np.testing.assert_allclose(pins.mean(axis=1), couple / (2 * radius), rtol=0.005)
     for k, (force, moment) in enumerate((expected[:2], expected[2:4])):
@@ -101,6 +122,42 @@ def test_slow_shafts_without_errors_obey_statics(alphas, arrangement, plane: flo
         assert np.abs(off).max() < 0.01 * largest / 1.2  # forces are moments over the shaft's length
         off = np.linalg.norm(loads[:, k, 3:5], axis=1) - np.linalg.norm(moment, axis=1)
         assert np.abs(off).max() < 0.01 * largest
+
+
+def test_a_shaft_turned_round_loads_its_joints_the_same() -> None:
+    """Slow shafts without friction at equal angles: joint 1 of one is joint 2 of the other, seen from the other end."""
+    found = []
+    for one, two in ((PRELOADED, WIDER), (WIDER, PRELOADED)):
+        shaft = drive_shaft(EIGHT, "W", joint2=of_file(two))
+        rows, mechanism = held(alpha=EIGHT, speed=20 * RPM, drive_shaft=shaft, **one)
+        result = simulate_rows(rows, Options(max_refinements=0), mechanism=mechanism).results
+        assert result["status"][0] in SIMULATED
+        found.append({name: load.of(result)[0] for name, load in loads_of(mechanism).items()})
+    forward, back = found
+    turned = {"1": "3", "2": "4", "3": "1", "4": "2"}  # pins in the input fork are in the output fork from there
+    for pin, other in turned.items():
+        for place, opposite in ((f"cross{pin}.F", f"cross{other}.F"), (f"pin{pin}.contact", f"pin{other}.contact")):
+            for a, b in (("joint1", "joint2"), ("joint2", "joint1")):
+                assert forward[f"{a}.{place}"] == pytest.approx(back[f"{b}.{opposite}"], rel=2e-3), place
+    for name in ("moment", "lateral"):
+        assert forward[f"input.{name}"] == pytest.approx(back[f"output.{name}"], rel=5e-3)
+        assert forward[f"output.{name}"] == pytest.approx(back[f"input.{name}"], rel=5e-3)
+    assert forward["joint1.cross1.F"] > 1.1 * forward["joint2.cross1.F"], "the test wants unlike joints"
+
+
+def test_two_unlike_joints_have_the_loads_of_another_integrator() -> None:
+    """Radau's method on a shaft with errors, one of whose joints turns in needles and rubs; its faces are pressed."""
+    own = {"thrust": PRELOADED["thrust"], "friction": {"mu": 0.02, "radius": "12 mm"}, "shaft": {"axial": "rigid"}}
+    shaft = drive_shaft(SIX, "Z", joint2=joint.load("pin25", own, "case.toml"))
+    errors = {"joint1.pin1.offset_t": 3e-5, "joint2.hole3.offset_t": -2e-5, "joint2.pin2.tilt_z": 5e-4}
+    rows, mechanism = held(errors, alpha=EIGHT, speed=500 * RPM, drive_shaft=shaft, **PRELOADED)
+    ours = simulate_rows(rows, Options(steps_per_rev=720), mechanism=mechanism).results
+    assert ours["status"][0] in SIMULATED
+    theirs = reference_rows(rows, Options(steps_per_rev=180), closure_tol=1e-4, mechanism=mechanism)
+    assert theirs["status"][0] == Status.OK
+    for field in ("F_max", "T_max", "contact_max", "thrust_max"):
+        largest = np.abs(theirs[field]).max()
+        np.testing.assert_allclose(ours[field], theirs[field], atol=2e-4 * largest, err_msg=field)
 
 
 @pytest.mark.parametrize("speed", [500.0, 1000.0])

@@ -71,10 +71,10 @@ def halves(case):
     left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
     ((_, samples),) = simulation.simulate_together(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
-    outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
+    outer = np.sign(par.station_s[0, 0, : par.n_stations[0, 0]]) / 2 + 0.5
     for k, sample in enumerate(samples):
         dynamics.forces(2 * np.pi * k / len(samples) / par.omega[0], sample["q"], sample["v"], par[0], work)
-        force = work.station[:, : par.n_stations[0], FORCE]
+        force = work.station[:, : par.n_stations[0, 0], FORCE]
         found[k] = np.stack([force @ outer, force @ (1 - outer)], axis=1)
     return found
 

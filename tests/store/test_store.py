@@ -35,7 +35,7 @@ def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
 
 def new_store(path: Path, study: fakes.Study) -> Writer:
     specs = fakes.specs_of(study.output.histories)
-    return Writer.create(path, study, [fakes.draw(study)], specs, {"pin1.offset_e": 3})
+    return Writer.create(path, study, [fakes.draw(study)], specs)
 
 
 @pytest.fixture
@@ -68,7 +68,6 @@ def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fake
         assert store.identity == study.identity()
         assert store.joint == study.joint
         assert store.options["steps_per_rev"] == 30
-        assert store.sampling["dimensions"] == {"pin1.offset_e": 3}
         assert store.sampling["seed"] == study.seed
         assert store.limits == {"cross1.F": 700.0}
         assert store.versions["tolstat"] == tolstat.__version__

@@ -9,9 +9,9 @@ import pytest
 
 from tolstat import study
 from tolstat.common.cardan import CARDAN
+from tolstat.common.error_fields import error_units
 from tolstat.common.errors import InputError
 from tolstat.study import crosses
-from tolstat.study.selection import error_units
 
 UNITS = error_units(CARDAN)
 CROSS = "part;pin1.tilt_z;pin1.offset_t;pin1.contact_outer_max\n-;deg;mm;N\nA7;0,21;0,03;700\n"

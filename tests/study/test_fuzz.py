@@ -33,7 +33,7 @@ NAMES = (
     *("plus_minus", "distribution", "cpk", "lower", "upper", "zone", "over", "file", "column", "names", "rho", "[", ""),
 )
 WORDS = (
-    *("normal", "uniform", "measured", "lognormal", "random", "sobol", "lhs", "sweep", "cases", "auto"),
+    *("normal", "uniform", "measured", "lognormal", "random", "sweep", "cases", "auto"),
     *("cirelli2021", "own", "/dev/zero", "../a.toml", "H7/g6", "f", "\x1b[2J", "\u202e", "nan", "1e999", "a.csv"),
 )
 SECTIONS = (*OF_STUDY, "joint.contact", "tolerances.pin1", "sampling.n", "output.results", "x")

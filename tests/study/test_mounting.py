@@ -16,7 +16,7 @@ from tolstat.common.tables import Options, Simulation
 from tolstat.joint import operating, perturb
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
-from tolstat.study.points import note_on_pins, note_on_shafts
+from tolstat.study.mounting import note_on_pins, note_on_shafts
 
 HEAD = """[joint]
 base = "cirelli2021"

@@ -87,9 +87,9 @@ def test_a_result_file_elsewhere_names_its_study(first: Path, tmp_path: Path) ->
 @pytest.mark.parametrize("lost", ["gone", "edited"])
 def test_a_joint_file_that_is_not_there_is_written_beside_the_study(first: Path, tmp_path: Path, lost: str) -> None:
     plan, joint = study.load(first), first.with_name("own_joint.toml")
-    assert placing.joint_beside(plan) == ""
+    assert placing.joints_beside(plan) == {}
     joint.unlink() if lost == "gone" else joint.write_text(joint.read_text().replace("37.49 mm", "37.5 mm"))
-    text = placing.joint_beside(plan)
+    text = placing.joints_beside(plan)[("joint",)]
     (tmp_path / "other.toml").write_text(text, encoding="utf-8")
     again = study.load(first, text=TEXT.replace('"own_joint.toml"', '"../other.toml"'))
     assert again.identity() == plan.identity() | {"sampling.n": 60}

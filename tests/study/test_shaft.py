@@ -17,7 +17,8 @@ from tolstat.common.cardan import MECHANISMS
 from tolstat.common.errors import InputError
 from tolstat.joint import OperationOfShaft, perturb
 from tolstat.solver import fidelity
-from tolstat.study import assumptions, changes, points, schema
+from tolstat.study import assumptions, changes, mounting, schema
+from tolstat.study.points import Point
 
 FACES = 'thrust = { end_play = "0.05 mm", k = "1e8 N/m" }\n'
 FREE = 'shaft = { axial = "free", mass = "5 kg", axial_damping = "2e4 N*s/m" }\n'
@@ -72,7 +73,7 @@ def test_the_table_makes_a_study_of_two_joints() -> None:
     drawn = perturb(read.joint, read.operation, sampling.draw(read))
     assert (drawn["pin_point"][1:] != 0.0).any(axis=2).all()
     assert isinstance(load(CASES).operations[0], OperationOfShaft)
-    assert points.Point.of("", read.points[0].values()) == read.points[0]
+    assert Point.of("", read.points[0].values()) == read.points[0]
 
 
 POINTS = """[[operation]]
@@ -104,7 +105,7 @@ def test_the_grade_of_a_tube_is_for_its_own_mass(spline: str, names: list[str], 
     text = WHOLE.replace(' wall = "2.5 mm" }', f' wall = "2.5 mm"{grade}') + spline
     read = load(text)
     assert read.mechanism.unbalanced == (*names, "output")
-    assert points.Point.of("", read.points[0].values()) == read.points[0]
+    assert Point.of("", read.points[0].values()) == read.points[0]
     row = perturb(read.joint, read.operation, sampling.draw(read))[0]
     mass = 7850 * np.pi / 4 * (0.076**2 - 0.071**2) * np.array([*lengths, 0.0])
     np.testing.assert_allclose(row["unbalance"], np.outer(0.016 / (100 * np.pi) * mass, [0, 1]), atol=1e-15)
@@ -116,7 +117,7 @@ def test_the_grade_of_a_tube_is_for_its_own_mass(spline: str, names: list[str], 
 def test_joint_2_may_have_an_angle_at_each_operating_point() -> None:
     read = load(with_points(WHOLE))
     np.testing.assert_allclose([at.operation.alphas for at in read.points], np.radians([[8, 6], [4, 3]]))
-    assert [points.Point.of(at.name, at.values()) for at in read.points] == list(read.points)
+    assert [Point.of(at.name, at.values()) for at in read.points] == list(read.points)
     drawn = perturb(read.joint, read.points[1].operation, sampling.draw(read))
     np.testing.assert_allclose(drawn["alpha"][0], np.radians([4, 3]))
     too_far = refused(with_points(WHOLE).replace('"3 deg"', '"93 deg"'))
@@ -295,7 +296,7 @@ def test_shafts_with_a_spline_are_not_freed() -> None:
         read = load(text)
         assert ("mounting" in assumptions.given(read)) == splined
         assert ("mounting" not in [assumption.name for assumption in assumptions.assumptions(read)]) == splined
-        note = points.note_on_shafts(read.tolerances, ["rigid"], read.mechanism, "tolstat run x.toml")
+        note = mounting.note_on_shafts(read.tolerances, ["rigid"], read.mechanism, "tolstat run x.toml")
         assert note.endswith("" if splined else "With a free output shaft: tolstat run x.toml")
         assert bool(note) != splined
 

@@ -79,7 +79,7 @@ def test_keys_that_are_errors_too_are_swept_as_values_of_the_joint(tmp_path: Pat
     s = load(tmp_path, ('base = "cirelli2021"', 'base = "pin25"'), (TEXT[TEXT.index("[sweep]") :], axes))
     drawn = sampling.draw(s)
     made = [perturb(joint, s.operation, drawn[i : i + 1]) for i, joint in enumerate(s.joints)]
-    assert [row["mu"][0] for row in made] == pytest.approx([0.004, 0.002, 0.002, 0.051, 0.051, 0.1, 0.1])
+    assert [row["mu"][0, 0] for row in made] == pytest.approx([0.004, 0.002, 0.002, 0.051, 0.051, 0.1, 0.1])
     assert [joint.thrust.end_play for joint in s.joints if joint.thrust] == pytest.approx([2e-5, *(0.0, 1e-4) * 3])
     assert not drawn["thrust.end_play"].any()
 

@@ -246,7 +246,7 @@ ZONES = """
 def test_a_common_axis_shorter_than_between_its_bearings_is_told():
     head = f'{HEAD}\n[tolerances]\n{ZONES}\n[sampling]\nmethod = "random"\nn = 8\nseed = 1\n'
     plan = study.load(Path("x.toml"), text=head)
-    ((key, found, remedy),) = zones.short_axes(plan.entries, plan.joint.contact.z)
+    ((key, found, remedy),) = zones.short_axes(plan.entries, lambda _: plan.joint.contact.z)
     assert key == "tolerances.output_holes.position.over"
     assert found == "22 mm is shorter than the 146 mm between the bearings"
     assert remedy.endswith("2 (R + z/2) = 168 mm")

@@ -256,7 +256,6 @@ def warm_up(options: Options, params: np.ndarray | None = None, mechanism: Mecha
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "draw_blocks": draw_blocks,
     "origin_blocks": lambda *_: None,
-    "dimensions": lambda mechanism: {"pin1.offset_e": 0},
     "perturb": perturb,
     "parameters": parameters,
     "history_specs": history_specs,

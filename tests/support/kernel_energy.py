@@ -97,18 +97,19 @@ def needle_energy(k3, delta, lost):
 @njit
 def contact_energy(pin, par, springs, work, out):
     """Add the elastic energy and the powers of the contact of `pin`; ``work.station`` holds the full forces."""
-    for j in range(par.n_stations):
+    kind = par.pair_kind[pin]
+    for j in range(par.n_stations[kind]):
         out.contact_damping += work.station[pin, j, FORCE] * work.station[pin, j, V_NORMAL]
     contact_load(pin, springs, work)
-    for j in range(par.n_stations):
-        station, weight = work.station[pin, j], par.station_weight[j]
+    for j in range(par.n_stations[kind]):
+        station, weight = work.station[pin, j], par.station_weight[kind, j]
         delta = station[DELTA]
         if delta <= 0:
             continue
         out.contact_damping -= station[FORCE] * station[V_NORMAL]
-        out.film += par.c_t * weight * smooth_step(delta / par.delta_d) * station[V_TANGENT] ** 2
-        out.contacts += (par.station_k1[j] * delta / 3 + par.station_k2[j] / 2) * delta**2
-        out.contacts += needle_energy(par.station_k3[j], delta, par.needle_b * par.clearance[pin])
+        out.film += par.c_t[kind] * weight * smooth_step(delta / par.delta_d[kind]) * station[V_TANGENT] ** 2
+        out.contacts += (par.station_k1[kind, j] * delta / 3 + par.station_k2[kind, j] / 2) * delta**2
+        out.contacts += needle_energy(par.station_k3[kind, j], delta, par.needle_b[kind] * par.clearance[pin])
 
 
 @njit

@@ -47,7 +47,7 @@ def sample(study: Study, n: int) -> Sample:
     """Take the first n random joints of a study, and keep those with as many contact stations as the first."""
     first = study.first_sample
     params = parameters(study, np.arange(first, min(first + n, study.rows)))
-    alike = params["n_stations"] == params["n_stations"][0]
+    alike = (params["n_stations"] == params["n_stations"][0]).all(axis=1)
     options = study.solver.options()
     fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0, max_refinements=0)
     return Sample(np.ascontiguousarray(params[alike]), fixed)

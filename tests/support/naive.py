@@ -191,15 +191,25 @@ def contact_mode(stations):
     return "TWO_POINT" if sides[0] @ sides[1] < 0 else "UNIFORM"
 
 
+def kind_of(p, mechanism):
+    """Number of the kind of pair p."""
+    return mechanism.pair_kinds.index(mechanism.pairs[p].kind)
+
+
+def needles(delta, p, kind, j, par):
+    """Force of the needles at station j of pair p, N."""
+    return par.station_k3[kind, j] * delta ** (13 / 8) / np.sqrt(delta + par.needle_b[kind] * par.clearance[p])
+
+
 def stations_of(p, now, par, mechanism):
     """Stations of the pin of pair p that touch its hole or not: point, normal, penetration, pressing force, force."""
     pin, hole = (mechanism.bodies.index(name) for name in (mechanism.pairs[p].pin, mechanism.pairs[p].hole))
     position, attitude = now.bodies
     centre = position[hole] + attitude[hole] @ par.hole_point[p]
     axis = attitude[hole] @ par.hole_axis[p]
-    stations = []
-    for j in range(par.n_stations):
-        point = position[pin] + attitude[pin] @ (par.pin_point[p] + par.station_s[j] * par.pin_axis[p])
+    stations, kind = [], kind_of(p, mechanism)
+    for j in range(par.n_stations[kind]):
+        point = position[pin] + attitude[pin] @ (par.pin_point[p] + par.station_s[kind, j] * par.pin_axis[p])
         d = point - centre
         g = d - (d @ axis) * axis
         n, delta = g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p]
@@ -207,12 +217,12 @@ def stations_of(p, now, par, mechanism):
             stations.append((point, n, delta, 0.0, np.zeros(3)))
             continue
         slip = velocity_at(point, pin, now) - velocity_at(point, hole, now)
-        elastic = par.station_k1[j] * delta**2 + par.station_k2[j] * delta
-        elastic += par.station_k3[j] * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p])
-        ramp = par.station_weight[j] * smooth_step(delta / par.delta_d)
-        pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
+        elastic = par.station_k1[kind, j] * delta**2 + par.station_k2[kind, j] * delta
+        elastic += needles(delta, p, kind, j, par)
+        ramp = par.station_weight[kind, j] * smooth_step(delta / par.delta_d[kind])
+        pressing = max(0.0, elastic + par.c_d[kind] * ramp * (slip @ n))
         tangential = slip - (slip @ n) * n - (slip @ axis) * axis
-        stations.append((point, n, delta, pressing, -pressing * n - par.c_t * ramp * tangential))
+        stations.append((point, n, delta, pressing, -pressing * n - par.c_t[kind] * ramp * tangential))
     return stations
 
 
@@ -220,6 +230,7 @@ def face_of(i, now, par, mechanism):
     """Thrust face i: where the end of the pin is, direction in which the hole stops it, penetration, pressing force."""
     face = mechanism.faces[i]
     p = [pair.pin for pair in mechanism.pairs].index(face.pin)
+    kind = kind_of(p, mechanism)
     pin, hole = (mechanism.bodies.index(name) for name in (face.pin, mechanism.pairs[p].hole))
     position, attitude = now.bodies
     end = position[pin] + attitude[pin] @ (par.pin_point[p] + par.face_at[i, 0] * par.pin_axis[p])
@@ -227,22 +238,22 @@ def face_of(i, now, par, mechanism):
     inwards = -face.end * attitude[hole] @ par.hole_axis[p]
     delta = (stop - end) @ inwards
     approach = (velocity_at(end, hole, now) - velocity_at(end, pin, now)) @ inwards
-    pressing = par.face_k * delta + par.face_c * smooth_step(delta / par.delta_d) * approach
+    pressing = par.face_k[kind] * delta + par.face_c[kind] * smooth_step(delta / par.delta_d[kind]) * approach
     return end, inwards, delta, max(0.0, pressing) if delta > 0 else 0.0
 
 
 def rubbing_of(p, now, par, mechanism):
     """Friction on the pin of pair p at each station that presses: point, force, power that is lost."""
     pin, hole = (mechanism.bodies.index(name) for name in (mechanism.pairs[p].pin, mechanism.pairs[p].hole))
-    found = []
+    found, kind = [], kind_of(p, mechanism)
     for point, n, _, pressing, _ in stations_of(p, now, par, mechanism):
-        surface = point + par.friction_radius * n
+        surface = point + par.friction_radius[kind] * n
         w = velocity_at(surface, pin, now) - velocity_at(surface, hole, now)
         w = w - (w @ n) * n
         axis = now.bodies.attitude[hole] @ par.hole_axis[p]
-        around_and_along = np.eye(3) + (par.mu_ratio - 1) * np.outer(axis, axis)
+        around_and_along = np.eye(3) + (par.mu_ratio[kind] - 1) * np.outer(axis, axis)
         u = around_and_along @ w
-        force = -par.mu * pressing * around_and_along @ u / np.sqrt(u @ u + par.slip_speed**2)
+        force = -par.mu[kind] * pressing * around_and_along @ u / np.sqrt(u @ u + par.slip_speed[kind] ** 2)
         found.append((surface, force, -force @ w))
     return found
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.common.bisection import first
+from tolstat.common.counts import POWER
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
@@ -87,37 +88,46 @@ def simultaneous(n: int, confidence: float = 0.95) -> float:
     return min(1.0, float(np.sqrt(0.5 * np.log(2.0 / (1.0 - confidence)) / max(n, 1))))
 
 
-def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
-    """Minimum number of joints for a Clopper–Pearson interval that excludes an accepted share.
+def needed(share: float, accepted: float, confidence: float = 0.95, power: float = POWER) -> float:
+    """Minimum number of joints whose Clopper–Pearson interval excludes an accepted share in most campaigns.
 
     Parameters
     ----------
     share : float
-        Assumed share of the joints above the level, such as the estimate of an earlier campaign.
+        True share of the joints above the level.
     accepted : float
         Accepted share, between 0 and 1.
     confidence : float
         Confidence level of the interval.
+    power : float
+        Share of the campaigns with that many independent joints whose interval excludes `accepted`.
 
     Returns
     -------
     float
-        Least number of independent joints whose interval, with exactly `share` of them above the level, excludes
-        `accepted`; infinite if both shares are equal.
+        Infinite if both shares are equal.
 
     Examples
     --------
     >>> needed(0.0, 0.01)  # none of 368 joints
     368.0
+    >>> needed(0.05, 0.1)  # 142 joints with 5 % of them above would do, but half of the campaigns have more above
+    292.0
     """
     if share == accepted:
         return np.inf
+    p, limit = (share, accepted) if share < accepted else (1.0 - share, 1.0 - accepted)  # of joints above, or below
+    tail = 0.5 * (1.0 - confidence)
 
-    def tells(n: NDArray[np.intp]) -> NDArray[np.bool_]:
-        lower, upper = clopper_pearson(share * n, n, confidence)
-        return np.asarray((upper <= accepted) | (lower > accepted))
+    def at_most(k: NDArray[np.intp], n: NDArray[np.intp], p: float) -> FloatArray:
+        """Probability of at most k of n joints."""
+        return np.asarray(special.betaincc(k + 1.0, n - k, p))
 
-    return float(first(tells, 1, 10**15))  # with the share fixed, more joints make the interval narrower
+    def joints(k: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Least number of joints of which k may be there for an interval below the limit."""
+        return first(lambda n: at_most(k, n, limit) <= tail, k + 1, 10**12)
+
+    return float(joints(first(lambda k: at_most(k, joints(k), p) >= power, 0, 10**9)))
 
 
 def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float = 0.95) -> bool:

@@ -145,7 +145,6 @@ class Clustered(Design):
         The lots, ascending.
     """
 
-    has_intervals = True
     interval = "Student's t over lots, on the logit"
     covers = f"bands: pointwise 95 % intervals of the settled joints, {interval}"
     of_quantiles = "over lots"

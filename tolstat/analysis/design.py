@@ -1,28 +1,24 @@
 """What the joints of a campaign allow to conclude: the contract of a sampling design, and the plainest ones.
 
-Independent joints; joints that are listed: sweeps, cases, and one set of Sobol' points or one
-Latin hypercube. The joints of such a set are not independent of each other, so formulas for independent samples do not
-give the uncertainty of its estimates. Sets of different seeds are independent, and so are the replicates of one file,
-which are consecutive blocks of its joints.
+Independent joints, and joints that are no sample of a production: sweeps, cases, levels of a subset simulation.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson, half_width
+from tolstat.analysis.binomial import LOOK_CONFIDENCE, clopper_pearson
 from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.loads import FloatArray
 
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
-SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
-"""Sampling methods of a production whose joints are not independent."""
+SAMPLE = 'give the file of a study with sampling.method = "random"'
+"""Remedy where joints are no sample of a production."""
 
 
 class Design:
@@ -31,9 +27,7 @@ class Design:
     Attributes
     ----------
     is_sample : bool
-        Whether the joints are a sample of a production.
-    has_intervals : bool
-        Whether shares and quantiles have intervals.
+        Whether the joints are a sample of a production: only then shares and quantiles have intervals.
     independent : bool
         Whether the joints are independent of each other: then every estimate has an interval.
     interval : str
@@ -51,11 +45,10 @@ class Design:
         Whether that end is then the innermost load, not the outermost, at which shares exclude the quantile.
     """
 
-    is_sample: bool = True
-    has_intervals: ClassVar[bool] = False
+    is_sample: ClassVar[bool] = True
     independent: ClassVar[bool] = False
     interval: str = ""
-    covers: str = "no intervals: Clopper–Pearson holds for independent samples only"
+    covers: str = "no intervals: the joints are no sample of a production"
     of_quantiles: ClassVar[str] = "of order statistics"
     of_delivery: ClassVar[str] = ""
     ranks_at_once: ClassVar[int] = 16
@@ -81,6 +74,10 @@ class Design:
         with np.errstate(invalid="ignore"):  # NaN without joints
             return np.asarray(x.above(levels) / np.float64(x.n))
 
+    def level(self, confidence: float) -> float:
+        """Confidence level with which intervals are computed, for them to hold with `confidence`; by default that."""
+        return confidence
+
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """Return the design of some of the joints; by default the same."""
         return self
@@ -88,11 +85,6 @@ class Design:
     def refuses(self) -> tuple[str, str] | None:
         """Return why the joints give no estimate, and the remedy, of file ``{path}``; None if they do."""
         return None
-
-    def without_interval(self, claim: Literal["share", "mean"]) -> str:
-        """Return why an estimate has no interval, with the remedy; empty if it has one."""
-        has_interval = self.has_intervals if claim == "share" else self.independent
-        return "" if has_interval else f"the joints depend on each other: a {claim} has no interval"
 
     def units(self, n: int) -> NDArray[np.intp]:
         """Number of the unit of each of n joints, (n,): units are independent of each other."""
@@ -125,13 +117,13 @@ class Design:
 class Independent(Design):
     """Joints drawn one by one from the tolerances."""
 
-    has_intervals = independent = True
+    independent = True
     interval = "Clopper–Pearson's"
     covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""
-        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, confidence))
+        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, self.level(confidence)))
 
     def delivery(
         self, lower: Column, upper: Column, level: float, number: int, confidence: float
@@ -139,11 +131,22 @@ class Independent(Design):
         """See `Design.delivery`; exact (Thatcher 1964)."""
         at = np.array([level])
         least, most = int(lower.above(at)[0]), int(upper.above(at)[0])
-        return prediction.of_counts(least, most, upper.n, number, confidence)
+        return prediction.of_counts(least, most, upper.n, number, self.level(confidence))
+
+
+class Looked(Independent):
+    """Joints drawn one by one until a stop rule ended the campaign: intervals hold after any number of its looks."""
+
+    interval = f"Clopper–Pearson's of {100 * LOOK_CONFIDENCE:g} %, valid after any number of looks"
+    covers = "bands: pointwise 95 % intervals of the settled joints, valid after any number of looks"
+
+    def level(self, confidence: float) -> float:
+        """See `Design.level`: an interval of one look misses less often, as at a stop (`binomial.LOOK_CONFIDENCE`)."""
+        return 1.0 - (1.0 - confidence) * (1.0 - LOOK_CONFIDENCE) / 0.05
 
 
 class Listed(Design):
-    """Joints that depend on each other, so that no estimate has an interval.
+    """Joints that are no sample of a production, so that no estimate has an interval.
 
     Parameters
     ----------
@@ -151,75 +154,17 @@ class Listed(Design):
         Sampling method.
     """
 
+    is_sample = False
+
     def __init__(self, method: str = "") -> None:
         self._method = method
-        self.is_sample = method in (*WITHOUT_INTERVAL, "random")
 
     def refuses(self) -> tuple[str, str] | None:
         """See `Design.refuses`."""
         if self._method == "subset":
             remedy = "print its probability: tolstat rare {path}"
             return "holds the levels of a subset simulation, no random sample", remedy
-        if self._method in ("cases", "sweep"):
-            return "holds joints that are no sample of a production", SAMPLE
-        return None
-
-    def without_interval(self, claim: Literal["share", "mean"]) -> str:
-        """See `Design.without_interval`."""
-        return without_interval(self._method) or super().without_interval(claim)
-
-
-class Replicated(Design):
-    """Consecutive blocks of joints, each a set of Sobol' points or a Latin hypercube of its own.
-
-    Parameters
-    ----------
-    n : int
-        Number of joints.
-    number : int
-        Number of replicates, of equal size.
-    method : str
-        Sampling method.
-    """
-
-    has_intervals = True
-    of_quantiles = "over replicates"
-    ranks_at_once = 2000
-    innermost = True  # ends of shares are wider where few joints are above
-
-    def __init__(self, n: int, number: int, method: str) -> None:
-        self._blocks = np.arange(n) // (n // number)
-        self._method = method
-        self.interval = f"Student's t over {number} replicates"
-        self.covers = f"bands: pointwise 95 % intervals of the settled joints, {self.interval}"
-
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
-        """See `Design.shares`: Student's t over the shares of the replicates.
-
-        It contains the share of all joints, and where few are on a side of a level (`FEW`) the interval of as
-        many independent joints: no joint above in any replicate does not mean that none can be.
-        """
-        above, joints = counts_by_group(x, self._blocks, levels)
-        estimate = self.estimate(x, levels)
-        with np.errstate(invalid="ignore"):
-            each = above / joints[:, None]
-        half = half_width(confidence, len(each) - 1) * each.std(axis=0, ddof=1) / np.sqrt(len(each))
-        mean = each.mean(axis=0)
-        lower = np.fmin(np.maximum(mean - half, 0.0), np.nan_to_num(estimate, nan=0.0))
-        upper = np.fmax(np.minimum(mean + half, 1.0), np.nan_to_num(estimate, nan=1.0))
-        return or_independent(Estimate(estimate, lower, upper), x, levels, confidence)
-
-    def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
-        """See `Design.only`: parts of replicates are no replicates."""
-        return Listed(self._method)
-
-
-def without_interval(method: str) -> str:
-    """Return why shares of one set of joints have no interval, and the remedy; empty if they have one."""
-    if method not in WITHOUT_INTERVAL:
-        return ""
-    remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
-    return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"
+        return "holds joints that are no sample of a production", SAMPLE
 
 
 def or_independent(

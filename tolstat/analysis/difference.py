@@ -147,9 +147,9 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
     of_a, of_b = (side.quantile(share, confidence) for side in (a, b))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
-    known = all(side.design.independent if paired else side.design.has_intervals for side in (a, b))
+    known = all(side.design.independent if paired else side.design.is_sample for side in (a, b))
     if known and paired and min(share, 1.0 - share) * x.size >= BEYOND:
-        tail = 0.5 * (1.0 - confidence)
+        tail = 0.5 * (1.0 - max(a.design.level(confidence), b.design.level(confidence)))
         resampled = np.quantile(_resampled(x, y, share), [tail, 1.0 - tail], method="inverted_cdf")
         lower, upper = min(float(resampled[0]), estimate), max(float(resampled[1]), estimate)
     elif known:
@@ -190,7 +190,7 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
         error = float(np.sqrt(parts.sum()))
         inverse = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
         degrees = parts.sum() ** 2 / inverse if inverse else x.size + y.size - 2.0
-    half = float(half_width(confidence, degrees)) * error
+    half = float(half_width(max(a.design.level(confidence), b.design.level(confidence)), degrees)) * error
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
@@ -206,7 +206,7 @@ def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
 
 def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> tuple[Any, ...]:
     """Fields of `ShareDifference` up to the interval, of pairs."""
-    both = ~np.isnan(x.values) & ~np.isnan(y.values)
+    both, confidence = ~np.isnan(x.values) & ~np.isnan(y.values), max(a.level(confidence), b.level(confidence))
     of_a, of_b = x.values[both], y.values[both]
     n, up, down = of_a.size, of_b > of_a, of_b < of_a
     only_b = Column(of_b[up]).above(level) - Column(of_a[up]).above(level)

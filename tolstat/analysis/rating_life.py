@@ -23,14 +23,14 @@ A1 = dict(zip(_RELIABILITY, _FACTOR, strict=True))
 """Life modification factor a_1 by reliability (ISO 281:2007, Table 12)."""
 
 
-def basic_life(load: ArrayLike, rating: float) -> FloatArray:
+def basic_life(load: ArrayLike, rating: ArrayLike) -> FloatArray:
     """Basic rating life L10 of a roller bearing.
 
     Parameters
     ----------
     load : array_like
         Dynamic equivalent load P, N.
-    rating : float
+    rating : array_like
         Basic dynamic load rating C, N.
 
     Returns
@@ -44,10 +44,10 @@ def basic_life(load: ArrayLike, rating: float) -> FloatArray:
     2154.4
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(1e6 * (rating / np.asarray(load, float)) ** LIFE_EXPONENT)
+        return np.asarray(1e6 * (np.asarray(rating, float) / np.asarray(load, float)) ** LIFE_EXPONENT)
 
 
-def turns_per_revolution(alpha: ArrayLike, critical: float = 0.0) -> FloatArray:
+def turns_per_revolution(alpha: ArrayLike, critical: ArrayLike = 0.0) -> FloatArray:
     """Equivalent revolutions of a pin's bearing in a revolution of the shaft.
 
     Below the critical amplitude each needle stresses a part of the raceway of its own: the stressed volume V is in
@@ -59,7 +59,7 @@ def turns_per_revolution(alpha: ArrayLike, critical: float = 0.0) -> FloatArray:
     ----------
     alpha : array_like
         Misalignment, rad. Each pin swings from -alpha to alpha and back once a revolution.
-    critical : float
+    critical : array_like
         Critical amplitude, rad, see `critical_amplitude`.
 
     Examples

@@ -222,7 +222,7 @@ class Sample:
     def _interval(self, share: float, confidence: float) -> tuple[float, float]:
         """Ends of the interval of a quantile."""
         loads, n = self.valid, self.value.n
-        if not self.design.has_intervals:
+        if not self.design.is_sample:
             return np.nan, np.nan
         below = np.append(np.nextafter(loads[:1], -np.inf), loads[:-1])
 
@@ -251,6 +251,13 @@ class Sample:
         joints, *ends = self.inexact
         lower, upper = (end + np.nan_to_num(by[joints]) for end in ends)
         return replace(self, value=Column(self.values + by), inexact=Inexact(joints, lower, upper))
+
+    def with_scrap(self, joints: Mask) -> Sample:
+        """Return the load of the same joints, infinite for some without a valid load, (n,), which then count."""
+        (lost, lower, upper), kept = self.inexact, ~joints[self.inexact.joints]
+        inexact = Inexact(lost[kept], lower[kept], upper[kept])
+        value, status = np.where(joints, np.inf, self.values), np.where(joints, Status.OK, self.status)
+        return replace(self, value=Column(value), inexact=inexact, status=status.astype(np.uint8))
 
     def of_limit(self) -> Sample:
         """Return the ratio of load to limit of the same joints; its limit is 1."""

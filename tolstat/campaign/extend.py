@@ -27,7 +27,6 @@ from tolstat.store.writer import check_free, write_new
 from tolstat.study import Study
 
 NOT_EXTENDABLE = {
-    "lhs": "a Latin hypercube has as many strata as joints, so that more joints would change the existing ones",
     "sweep": "the points of a sweep determine its number of joints",
     "cases": "its study lists the joints one by one",
     "subset": "the levels of a subset simulation determine its number of joints",
@@ -116,7 +115,7 @@ def grow(
     """
     changes = {
         "identity": study.identity(),
-        "sampling": study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
+        "sampling": study.sampling.model_dump(mode="json"),
         "stop": {"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
         "campaign_rows": study.rows,
         "n": study.rows,
@@ -158,7 +157,9 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         rows = stores[0].campaign_rows
-        document = stores[0].metadata.model_copy(update={"stop": {}, "first_row": 0, "n": rows})
+        looks = sorted({look for store in stores for look in store.stop.get("looks", ())})  # they stay looks
+        stop = {"reached": False, "looks": looks} if looks else {}
+        document = stores[0].metadata.model_copy(update={"stop": stop, "first_row": 0, "n": rows})
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
@@ -176,8 +177,6 @@ def _check_extendable(store: Reader, n: int) -> None:
     place, joints = str(store.path), store.sampling["n"]
     faults = []
     reason = NOT_EXTENDABLE.get(store.sampling["method"])
-    if "replicates" in store.sampling:
-        reason = "its replicates are consecutive blocks, so that more joints would change the existing ones"
     if reason:
         remedy = "change the study, and run it as another campaign: tolstat run STUDY --out OTHER.h5"
         faults.append(Fault(place, f"cannot be extended: {reason}", remedy))

@@ -19,6 +19,7 @@ from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, comp
 from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import number_of_workers
+from tolstat.common.error_fields import error_units
 from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.loads import shown_loads, units_of_loads
 from tolstat.common.tables import Options, tables
@@ -26,7 +27,7 @@ from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
 from tolstat.study import Study, axes, load
-from tolstat.study.selection import error_units, select, suggestion
+from tolstat.study.selection import select, suggestion
 
 if TYPE_CHECKING:
     import openturns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import resource
 import sys
 import time
@@ -20,13 +21,14 @@ from tolstat.campaign.block import spread
 from tolstat.campaign.chosen import few
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import number_of_workers
+from tolstat.common.errors import input_error
 from tolstat.common.loads import load_of, split
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
 from tolstat.joint import ideal
-from tolstat.sampling import dimensions, draw, streams
+from tolstat.sampling import draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.histories import history_specs
@@ -44,6 +46,8 @@ PILOT_S, FIRST = 20.0, 8
 """Processor time that the default pilot may take, s: joints at 85 deg take seconds each; joints that tell how long."""
 SHARES = (0.5, 0.1, 0.01)
 """Exceedances for which the width of the interval is predicted."""
+TRUE_SHARES = (0.5, 0.8)
+"""True shares, of what is accepted, for which the number of joints that decide is told."""
 QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
 """Newton iterations of a joint that does not rattle, from `studies/rigid_shafts.toml` with the default settings."""
@@ -170,6 +174,9 @@ class Plan:
         What correlations mean for the errors themselves: rows of `study.tolerances.correlation.correlations`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
+    deciding : dict of float to float
+        Number of joints that decide whether at most the accepted share is above a limit, in `POWER` of the campaigns,
+        by true share; empty without an accepted share.
     """
 
     rows: int
@@ -187,6 +194,7 @@ class Plan:
     widths: dict[float, float]
     limits: list[LimitPlan]
     wilks: dict[float, int]
+    deciding: dict[float, float]
     reversals: Reversals
     assembly: Assembly
     fit: list[str]
@@ -201,7 +209,9 @@ class Plan:
         return sum(self.stages.values())
 
 
-def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Tell = silent) -> Plan:
+def plan(
+    study: Study, workers: int | None = None, pilot: int = PILOT, stage: Tell = silent, accepted: float = math.nan
+) -> Plan:
     """Simulate a pilot of joints, spread over the study's rows, and predict cost and precision of the campaign.
 
     Parameters
@@ -215,11 +225,21 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         `PILOT_S`.
     stage : callable
         Called with the name of each stage when it begins.
+    accepted : float
+        Accepted share of the joints above a limit; NaN if none is given.
 
     Returns
     -------
     Plan
+
+    Raises
+    ------
+    InputError
+        When a share is accepted of joints that are not independent.
     """
+    iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
+    if not (iid or math.isnan(accepted)):
+        raise input_error("--accept", "numbers of joints are known for independent joints only", "leave it out")
     workers = number_of_workers(workers)
     stage(stage_name(study.mechanism))
     warm_up(mechanism=study.mechanism)
@@ -237,11 +257,10 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
     stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
-    iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
     status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
     specs = history_specs(solver, study.output.histories, study.output.harmonics, study.mechanism)
-    document = metadata.of_study(study, range(study.rows), specs, dimensions(study.mechanism), solver, choice)
+    document = metadata.of_study(study, range(study.rows), specs, solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -258,6 +277,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
+        deciding={part * accepted: binomial.needed(part * accepted, accepted) for part in TRUE_SHARES if accepted > 0},
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()]), study.mechanism),
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
@@ -272,10 +292,7 @@ def _joints(
     study: Study, rows: NDArray[np.intp], choice: dict[str, Any]
 ) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
     """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
-    if study.sampling.method == "lhs":
-        errors = draw(study)[rows]
-    else:
-        errors = np.concatenate([draw(study, range(row, row + 1)) for row in rows])
+    errors = np.concatenate([draw(study, range(row, row + 1)) for row in rows])
     each_options = [settings(solver, choice) for solver in study.solvers]
     at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
     return at, [each_options[number] for number in variants(study, rows)]

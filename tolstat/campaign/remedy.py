@@ -19,6 +19,7 @@ from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
+from tolstat.store.recorded import MISFIT, misfits
 from tolstat.study import Study
 from tolstat.study.rewriting import parsed
 
@@ -45,6 +46,8 @@ class Reason(NamedTuple):
         Row of the first in the campaign.
     remedy : str
         Remedy for the first.
+    why : str
+        What the status means; of joints that cannot be assembled that.
     point : str
         Operating point, where the campaign has several.
     """
@@ -53,6 +56,7 @@ class Reason(NamedTuple):
     joints: int
     row: int
     remedy: str
+    why: str
     point: str = ""
 
     @property
@@ -82,25 +86,27 @@ def reasons(store: Reader, status: Mapping[str, NDArray[np.uint8]]) -> list[Reas
     each = []
     for point, state in product(status, (*FAILED, *UNSETTLED)):
         slots = np.flatnonzero(status[point] == state)
-        if slots.size:
-            first, joint = int(slots[0]), int(store.row(slots[:1])[0])
-            row = store.at(point).results(slice(first, first + 1))[0]
-            each.append(Reason(Status(state), len(slots), joint, remedy(row, store.options), point))
+        scrap = misfits(store, slots) if state == Status.OUTSIDE_MODEL else np.zeros(slots.size, dtype=bool)
+        for own, why in ((slots[scrap], f"{MISFIT}: scrap in the yield"), (slots[~scrap], tables.STATUS_TEXT[state])):
+            if own.size:
+                first, joint = int(own[0]), int(store.row(own[:1])[0])
+                row = store.at(point).results(slice(first, first + 1))[0]
+                each.append(Reason(Status(state), len(own), joint, remedy(row, store.options), why, point))
     return sorted(each, key=lambda reason: -reason.joints)
 
 
 def in_words(reasons: Sequence[Reason]) -> Iterator[str]:
-    """Say why joints have no valid load: numbers, meaning and remedies of each status, in lines, each once."""
-    for status in dict.fromkeys(reason.status for reason in reasons):
-        first, *others = [reason for reason in reasons if reason.status == status]
+    """Say why joints have no valid load: numbers, meaning and remedies of each reason, in lines, each once."""
+    for why in dict.fromkeys(reason.why for reason in reasons):
+        first, *others = [reason for reason in reasons if reason.why == why]
         noun = "joint" if first.joints == 1 else "joints"
-        counts = [f"{first.joints} {noun} {status.label}{first.where}"]
+        counts = [f"{first.joints} {noun} {first.status.label}{first.where}"]
         counts += [f"{other.joints}{other.where}" for other in others]
         rows = {first.remedy: first}
         for other in others:
             rows.setdefault(other.remedy, other)
         hints = [f"  hint, for row {each.row}{each.where}: {remedy}" for remedy, each in rows.items()]
-        yield "\n".join([f"{', '.join(counts)}: {tables.STATUS_TEXT[status]}", *hints])
+        yield "\n".join([f"{', '.join(counts)}: {why}", *hints])
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError, input_error
 from tolstat.common.tables import Simulation, Status
 from tolstat.display.progress import JOINTS, Reporter, Tell, display, note, silent
-from tolstat.sampling import dimensions, draw_blocks, origin_blocks
+from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.solver import fidelity
 from tolstat.solver.compilation import stage_name
 from tolstat.solver.histories import MIN_SAMPLES, Histories, history_specs
@@ -254,7 +254,7 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
         histories = history_specs(options, *_history_options(study), study.mechanism)
         errors = draw_blocks(study, rows)
         origin = origin_blocks(study, rows)
-        return Writer.create(path, study, errors, histories, dimensions(study.mechanism), rows, options, choice, origin)
+        return Writer.create(path, study, errors, histories, rows, options, choice, origin)
     store = Writer.open(path)
     try:
         _check_same(store, study, rows)

@@ -12,12 +12,11 @@ if TYPE_CHECKING:
     from tolstat import store as stores
     from tolstat import study as studies
     from tolstat.analysis import accuracy as numerical
-    from tolstat.analysis import design
     from tolstat.campaign import extend, function, plan, pool, remedy, run, stop_rule
     from tolstat.campaign import replay as replays
     from tolstat.campaign import verify as checks
     from tolstat.campaign import work as works
-    from tolstat.common import columns, strict, tables, units
+    from tolstat.common import counts, strict, tables, units
     from tolstat.common import loads as load_units
     from tolstat.display import answer as answers
     from tolstat.display import rewording, style, table, text
@@ -30,18 +29,18 @@ if TYPE_CHECKING:
     from tolstat.report import answer as reports
     from tolstat.report import page, parts
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
-    from tolstat.study import assumptions, crosses, points, rewriting, starter
+    from tolstat.study import assumptions, crosses, mounting, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
-    names = ("numpy", "tolstat.store", "tolstat.study", "tolstat.analysis.accuracy", "tolstat.analysis.design")
-    np, stores, studies, numerical, design = map(Late, names)
+    names = ("numpy", "tolstat.store", "tolstat.study", "tolstat.analysis.accuracy")
+    np, stores, studies, numerical = map(Late, names)
     names = ("extend", "function", "plan", "pool", "remedy", "replay", "run", "stop_rule", "verify", "work")
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("columns", "loads", "strict", "tables", "units")
-    columns, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
+    names = ("counts", "loads", "strict", "tables", "units")
+    counts, load_units, strict, tables, units = (Late(f"tolstat.common.{name}") for name in names)
     names = ("answer", "rewording", "style", "table", "text")
     answers, rewording, style, table, text = (Late(f"tolstat.display.{name}") for name in names)
     names = ("accuracy", "joints", "drawings.answer", "drawings.dimensions", "exceedance.answer", "fatigue.loads")
@@ -50,7 +49,7 @@ else:
     reports, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
-    names = ("assumptions", "crosses", "points", "rewriting", "schema", "spectrum", "starter")
-    assumptions, crosses, points, rewriting, schemas, spectra, starter = (
+    names = ("assumptions", "crosses", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
+    assumptions, crosses, mounting, points, rewriting, schemas, spectra, starter = (
         Late(f"tolstat.study.{name}") for name in names
     )

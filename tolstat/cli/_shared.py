@@ -19,8 +19,7 @@ from tolstat import __version__
 from tolstat.cli._library import (
     answers,
     assumptions,
-    design,
-    points,
+    mounting,
     pool,
     recorded,
     rewording,
@@ -223,7 +222,7 @@ def _print_parts(answer: answers.Answer, wide: bool) -> None:
             echo(f"\n{part.title}\n{part.text}")
         elif isinstance(part, answers.Sentence):
             if part.place == "lead":
-                echo(part.text if wide else textwrap.fill(part.text, WIDTH))
+                echo(textwrap.fill(part.text, table.WIDE if wide else WIDTH))
                 first = False
             else:
                 say(part.text)
@@ -303,21 +302,28 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[table
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
+def print_warnings_of_joint2(path: Path, study: studies.Study) -> None:
+    """Print the warnings of joint 2 of a drive shaft, if it is another than joint 1; see `Joint.warnings`."""
+    if joint2 := study.operation.joint2:
+        for fault in joint2.warnings():
+            warn(f"warning: {path}: {replace(fault, place=f'shaft.joint2.{fault.place}')}")
+
+
 def print_study_notes(path: Path, study: studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
     These are mounting and contact law; notes on measured signals and joints; warnings of its joints, of values that are
-    probably not meant, shares without an interval, and a note where rigid shafts meet errors along them.
+    probably not meant, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
     for note in study.notes:
         say(f"note: {note}")
-    axial = [joint.shaft.axial for joint in study.joints]
-    command = points.with_free_shaft(str(path), path.stem, study.joint)
-    if note := points.note_on_shafts(study.tolerances, axial, study.mechanism, command):
+    joint2 = study.operation.joint2
+    axial = [joint.shaft.axial for joint in ([joint2] if joint2 else study.joints)]
+    command = mounting.with_free_shaft(str(path), path.stem, study.joint)
+    if note := mounting.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
+    print_warnings_of_joint2(path, study)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if study.sampling.replicates == 1 and (reason := design.without_interval(study.sampling.method)):
-        warn(f"warning: {reason}")

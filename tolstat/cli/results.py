@@ -187,7 +187,7 @@ def verify(
             verification = library.checks.check_near(what, near, joints or library.numerical.LEAST_NEAR, count, shown)
     units = dict.fromkeys(("median", "usual", "worst"), "1")
     mechanism, method = _sampled(what)
-    is_sample = near is None and method in library.columns.DRAWN
+    is_sample = near is None and method == "random"
     rows, by_load = (library.accuracy.error_rows(verification, mechanism, by_kind) for by_kind in (True, False))
     parts: list[library.answers.Part] = [
         library.answers.Table("kinds", "By kind of load", library.accuracy.ERRORS, rows, units),

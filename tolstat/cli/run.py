@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
@@ -25,7 +26,18 @@ from tolstat.cli._shared import (
 )
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
-from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
+from tolstat.display.options import (
+    Accepted,
+    AsJson,
+    Joints,
+    Opt,
+    OtherStudy,
+    Report,
+    ResultPath,
+    StudyPath,
+    Wide,
+    Workers,
+)
 
 
 def plan(
@@ -34,6 +46,7 @@ def plan(
     n: Joints = None,
     workers: Workers = None,
     pilot: Annotated[int | None, Opt("K", least=1)] = None,
+    accepted: Accepted = math.nan,
     as_json: AsJson = False,
 ) -> None:
     """Predict time, memory and precision of a campaign.
@@ -41,7 +54,9 @@ def plan(
     Simulates a few joints (pilot) and writes nothing. Prints the time of the whole command tolstat run (start, joints,
     check, report), memory and file size of the campaign, the width of the 95 % interval of exceedances and of each
     limit's exceedance, the number of joints that a 95 % bound of a quantile needs, and what each entry of [tolerances]
-    means: half width, radius or diameter, standard deviation of the error, share of the parts outside.
+    means: half width, radius or diameter, standard deviation of the error, share of the parts outside. With --accept
+    also the number of joints that decides the verdict in nine campaigns of ten, if the true share is half of the
+    accepted one, or 0.8 of it.
 
     Example: tolstat plan studies/iso2768_f.toml
 
@@ -52,10 +67,10 @@ def plan(
     """
     study = loaded(study_file, n=n)
     print_study_notes(study_file, study)
-    if note := library.points.note_on_pins(study.tolerances, study.mechanism):
+    if note := library.mounting.note_on_pins(study.tolerances, study.mechanism):
         say(f"note: {note}")
     with progress() as shown:
-        prediction = library.plan.plan(study, workers, pilot or library.plan.PILOT, shown.stage)
+        prediction = library.plan.plan(study, workers, pilot or library.plan.PILOT, shown.stage, accepted)
     if as_json:
         print_json(asdict(prediction) | {"seconds": prediction.seconds})
     else:
@@ -158,7 +173,7 @@ def extend(
     """Add joints to a campaign and simulate them.
 
     Draws the next joints of the sampling sequence and simulates them; the joints already in FILE do not change. FILE
-    then equals that of a campaign with N joints from the start. Latin hypercubes, sweeps and listed joints cannot be
+    then equals that of a campaign with N joints from the start. Sweeps and listed joints cannot be
     extended. Prints the report and writes its files as tolstat run does.
 
     To resume after an interruption: tolstat run STUDY --n N --out FILE
@@ -173,7 +188,7 @@ def extend(
     with progress("drawing the errors"):
         plan = library.extend.extend(file, n, study_file)
     about(plan.wording)
-    say(f"{file}: extended to {n} joints")
+    say(f"{file}: extended to {library.text.several(n, 'joint')}")
     simulate(plan, file, workers=workers)
     conclude(file, report, wide)
 
@@ -236,12 +251,11 @@ def simulate(plan: library.studies.Study, path: Path, until: str | None = None, 
         look, end = outcome.look, "reached" if outcome.reached else "not reached"
         biased = f", {library.stop_rule.BIASED}: go by the interval" if outcome.reached else ""
         say(
-            f"{rule.text}: {end} with {look.joints} joints, {look.above} above, "
+            f"{rule.text}: {end} with {library.text.several(look.joints, 'joint')}, {look.above} above, "
             f"{look.n_unresolved} failed or not settled\n"
             f"{100 * library.stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after "
-            "any number of looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
-            f"share above {look.estimate:.5f}{biased}; "
-            "shares and intervals in the report are not corrected for the stop"
+            "any number of looks, as those of the report are (failed and unsettled joints: below at its lower end, "
+            f"above at its upper end)\nshare above {look.estimate:.5f}{biased}"
         )
         with library.stores.ResultFile.open(path) as store:
             counts = store.counts()
@@ -271,7 +285,8 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
 def _lines(prediction: library.plan.Plan) -> Iterator[str]:
     yield f"joints: {prediction.rows}" + (f", each at {', '.join(prediction.points)}" if all(prediction.points) else "")
     yield f"random numbers a joint: {prediction.dimensions}"
-    yield f"pilot: {prediction.pilot} joints, {prediction.failed} failed, {prediction.unsettled} not settled"
+    pilot = library.text.several(prediction.pilot, "joint")
+    yield f"pilot: {pilot}, {prediction.failed} failed, {prediction.unsettled} not settled"
     if prediction.fidelity:
         yield prediction.fidelity
     if rattle := prediction.reversals.joints:
@@ -301,6 +316,9 @@ def _lines(prediction: library.plan.Plan) -> Iterator[str]:
         yield f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; {interval}"
     for q, n in prediction.wilks.items():
         yield f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}"
+    for true, number in prediction.deciding.items():
+        often = f"in {100 * library.counts.POWER:.0f} % of campaigns"
+        yield f"joints that decide the verdict {often} if {100 * true:.3g} % is the true share: {number:.0f}"
 
 
 def _duration(seconds: float) -> str:

@@ -19,6 +19,7 @@ from tolstat.cli._shared import (
     opened,
     print_json,
     print_warnings,
+    print_warnings_of_joint2,
     progress,
     say,
     told,
@@ -68,6 +69,7 @@ def simulate(
         for note in notes:
             say(note)
     print_warnings(case, [loaded.joint])
+    print_warnings_of_joint2(case, loaded)
     say(f"{loaded.name}: {loaded.joint_in_words}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)
@@ -276,8 +278,9 @@ def show(
     if errors:
         figure, rows = library.drawings.draw_errors(drawn.joint), library.drawings.meanings()
     elif drawn.errors is not None:
-        figure = library.drawings.draw_row(drawn.joint, drawn.errors, drawn.title)
-        rows = library.drawings.numbers(drawn.joint, drawn.errors)
+        joint2 = drawn.points[0].operation.joint2
+        figure = library.drawings.draw_row(drawn.joint, drawn.errors, drawn.title, joint2)
+        rows = library.drawings.numbers(drawn.joint, drawn.errors, joint2)
     else:
         figure = library.drawings.draw_joint(drawn.joint, drawn.points[0].operation, drawn.title, columns)
         rows = library.dimensions.dimensions(drawn.joint, drawn.points)

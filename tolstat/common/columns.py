@@ -126,10 +126,8 @@ SUBSET_FIELDS = (
 )
 SUBSET = dtype_of(SUBSET_FIELDS)
 
-METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
+METHODS = {"random": "random sampling", "sweep": "sweep"}
 """Sampling methods in words."""
-DRAWN = ("random", "sobol", "lhs")
-"""Sampling methods that draw every joint from the tolerances."""
 
 
 def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from tolstat.common.tables import FAILED, UNSETTLED, Status
 
+POWER = 0.9
+"""Share of the campaigns that decide with the number of joints that is said to decide."""
+
 
 class Counts(NamedTuple):
     """Numbers of joints by status.

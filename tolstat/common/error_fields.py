@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from tolstat.common.fields import Field
-from tolstat.common.mechanism import Mechanism, features, prefixes
+from tolstat.common.mechanism import Mechanism, features, with_play
 
 
 def error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
@@ -41,8 +43,19 @@ def error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         owner = "output shaft" if body == "output" else body
         fields.append(Field(f"{body}.unbalance", "kg*m", f"deviation of the {owner}'s unbalance"))
         fields.append(Field(f"{body}.unbalance_angle", "rad", "deviation of its direction"))
-    for prefix in prefixes(mechanism) if mechanism.faces else ():
-        fields.append(Field(f"{prefix}thrust.end_play", "m", "deviation of the cross's play along its pins"))
-    for pin in dict.fromkeys(face.pin for face in mechanism.faces if not mechanism.cardan):
-        fields.append(Field(f"{pin}.end_play", "m", "deviation of the pin's play between its faces"))
+    text = "deviation of the cross's play along its pins" if mechanism.cardan else "deviation of the pin's end play"
+    for name in dict.fromkeys(with_play(mechanism, face) for face in mechanism.faces):
+        fields.append(Field(f"{name}.end_play", "m", text))
     return tuple(fields)
+
+
+@cache
+def error_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of every error, in the order of the table."""
+    return {field.name: field.unit for field in error_fields(mechanism)}
+
+
+@cache
+def given_units(mechanism: Mechanism) -> dict[str, str]:
+    """SI unit of the errors that ``[errors]`` and a case can give."""
+    return {name: unit for name, unit in error_units(mechanism).items() if not name.startswith("operation.")}

@@ -145,11 +145,15 @@ class Hinge(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """Pin in a hole, by the names of their lumps, and the hinge between their members."""
+    """Pin in a hole, by the names of their lumps, and the hinge between their members.
+
+    Pairs of one `kind` have the same stations, film, friction and faces.
+    """
 
     pin: str
     hole: str
     hinge: str
+    kind: str = "bearing"
 
 
 class Face(NamedTuple):
@@ -234,6 +238,11 @@ class Mechanism(NamedTuple):
         return tuple(dict.fromkeys(bushing.kind for bushing in self.bushings))
 
     @property
+    def pair_kinds(self) -> tuple[str, ...]:
+        """Kinds of pairs, each once."""
+        return tuple(dict.fromkeys(pair.kind for pair in self.pairs))
+
+    @property
     def rotations(self) -> tuple[str, ...]:
         """Those of `unknowns` that are rotations."""
         return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
@@ -254,6 +263,11 @@ def features(mechanism: Mechanism) -> tuple[str, ...]:
     """Pins and holes, the lumps that have errors: all pins, then all holes, as the lumps are numbered."""
     pins, holes = ({getattr(pair, name) for pair in mechanism.pairs} for name in ("pin", "hole"))
     return tuple(lump.name for names in (pins, holes) for lump in mechanism.lumps if lump.name in names)
+
+
+def with_play(mechanism: Mechanism, face: Face) -> str:
+    """Name of what has the play of a face: the cross of its joint, ``joint1.thrust``, or the pin."""
+    return face.name.rstrip("1234") if mechanism.cardan else face.pin
 
 
 def carried(mechanism: Mechanism) -> list[int]:
@@ -321,6 +335,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "pin": [body[pair.pin] for pair in mechanism.pairs],
         "hole": [body[pair.hole] for pair in mechanism.pairs],
         "hinge": [hinge[pair.hinge] for pair in mechanism.pairs],
+        "pair_kind": [mechanism.pair_kinds.index(pair.kind) for pair in mechanism.pairs],
         "hinge_pin": [member[one.pin] for one in mechanism.hinges],
         "hinge_hole": [member[one.hole] for one in mechanism.hinges],
         "hinge_axis": [one.axis for one in mechanism.hinges],

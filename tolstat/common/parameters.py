@@ -39,9 +39,9 @@ def mark_of(mechanism: Mechanism) -> str:
 
 
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
-    """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump or bushing."""
+    """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump, bushing or pair."""
     joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
-    lumps, bushings = len(mechanism.lump_kinds), len(mechanism.bushing_kinds)
+    lumps, bushings, kinds = map(len, (mechanism.lump_kinds, mechanism.bushing_kinds, mechanism.pair_kinds))
     oblique = len(mechanism.lumps) if any(lump.quarters == OBLIQUE for lump in mechanism.lumps) else 0
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
@@ -62,7 +62,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("k_l", "N/m", "stiffness of the shafts' bearings across the output shaft; 0: free"),
         Field("c_l", "N*s/m", "damping across the output shaft"),
         Field("F_a", "N", "axial force on the output shaft, away from the joint"),
-        Field("R", "m", "typical length: distance of the pins' and arms' reference points from O"),
+        Field("R", "m", "typical length: smallest distance of the pins' and arms' reference points from O"),
         Field("pivot", "m", "where the origin of a member is in its parent", shape=(mechanism.placed, 3)),
         Field(
             "mount", "1", "axes, by columns, of a member in its parent at the angle 0", shape=(mechanism.placed, 3, 3)
@@ -90,16 +90,21 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             shape=(bushings, 2, 3),
         ),
         Field("push", "N", "force of a bushing that is pushed, along its z on the lump"),
-        Field("c_d", "N*s/m", "normal contact damping"),
-        Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
-        Field("delta_d", "m", "penetration over which contact damping rises"),
-        Field("n_stations", "1", "contact stations per pin", "i8"),
-        Field("station_s", "m", "signed distance of each station from P along the pin, falling", shape=(MAX_STATIONS,)),
-        Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(MAX_STATIONS,)),
-        Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
-        Field("station_k3", "N/m^(9/8)", "coefficient of each station's needles", shape=(MAX_STATIONS,)),
-        Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
-        Field("needle_b", "1", "share b of the clearance in the force of needles; 0: no needles"),
+        Field("c_d", "N*s/m", "normal contact damping", shape=(kinds,)),
+        Field("c_t", "N*s/m", "tangential contact damping (lubricant film)", shape=(kinds,)),
+        Field("delta_d", "m", "penetration over which contact damping rises", shape=(kinds,)),
+        Field("n_stations", "1", "contact stations per pin", "i8", (kinds,)),
+        Field(
+            "station_s",
+            "m",
+            "signed distance of each station from P along the pin, falling",
+            shape=(kinds, MAX_STATIONS),
+        ),
+        Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(kinds, MAX_STATIONS)),
+        Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(kinds, MAX_STATIONS)),
+        Field("station_k3", "N/m^(9/8)", "coefficient of each station's needles", shape=(kinds, MAX_STATIONS)),
+        Field("station_weight", "1", "weight of each station's damping and film", shape=(kinds, MAX_STATIONS)),
+        Field("needle_b", "1", "share b of the clearance in the force of needles; 0: no needles", shape=(kinds,)),
         Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
         Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
         Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),
@@ -113,12 +118,12 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "thrust faces: of the pin from P along its axis, of the hole from its centre along its axis",
             shape=(len(mechanism.faces), 2),
         ),
-        Field("face_k", "N/m", "stiffness of a thrust face"),
-        Field("face_c", "N*s/m", "damping of a thrust face"),
-        Field("mu", "1", "coefficient of friction of pins around their axes"),
-        Field("mu_ratio", "1", "coefficient of friction along the pins over that around them"),
-        Field("friction_radius", "m", "distance from the pin's axis at which friction acts"),
-        Field("slip_speed", "m/s", "sliding speed over which friction rises"),
+        Field("face_k", "N/m", "stiffness of a thrust face", shape=(kinds,)),
+        Field("face_c", "N*s/m", "damping of a thrust face", shape=(kinds,)),
+        Field("mu", "1", "coefficient of friction of pins around their axes", shape=(kinds,)),
+        Field("mu_ratio", "1", "coefficient of friction along the pins over that around them", shape=(kinds,)),
+        Field("friction_radius", "m", "distance from the pin's axis at which friction acts", shape=(kinds,)),
+        Field("slip_speed", "m/s", "sliding speed over which friction rises", shape=(kinds,)),
         Field(
             "bearing_at",
             "m",

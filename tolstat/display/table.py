@@ -5,8 +5,10 @@ Text fits a line of `WIDTH` characters: columns are left out, those of the highe
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from tolstat.display.text import align, formed
@@ -15,6 +17,11 @@ Row = Mapping[Any, Any]
 Rows = Sequence[Row]
 WIDTH = 80
 """Characters in a line of a table, unless a wide one is asked for."""
+WIDE = 160
+"""Characters in a line of a wide table, whose longest words are folded."""
+
+_LEAST = 12
+"""Least width of a column of words that is folded."""
 
 
 def _always(_: Rows) -> bool:
@@ -105,6 +112,15 @@ def by_share(rows: Rows, *keys: str) -> Rows:
     return list(grouped.values())
 
 
+def alike(rows: Rows, columns: Sequence[Column]) -> Rows:
+    """Rows whose cells all agree but for the ``load`` as one, with the names of all loads; other rows as they are."""
+    grouped: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        cells = tuple(column.cell({**row, "load": ""}) for column in columns if column.shown(rows))
+        grouped.setdefault(cells, []).append(row)
+    return [{**same[0], "load": ", ".join(row["load"] for row in same)} for same in grouped.values()]
+
+
 def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], rank: int = 0) -> list[Column]:
     """Columns of the rows of `by_share`, one a share: ``99 % reach``; the last one is never left out, see `Column`."""
 
@@ -117,19 +133,35 @@ def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], ra
 def fitted(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> tuple[str, str]:
     """Aligned text of a table in lines of at most `width` characters if it can be, and what it leaves out.
 
-    Without `width` it has all columns. The second text is a sentence that names the columns left out; empty if there
-    are none.
+    Without `width` it has all columns, and words are folded to lines of `WIDE` characters. The second text is a
+    sentence that names the columns left out; empty if there are none.
     """
     able = used = [column for column in columns if column.shown(rows)]
     while True:
-        cells = [[column.cell(row) for column in used] for row in rows]
-        shown = align([[column.head for column in used], *cells], [column.words for column in used])
+        words = [column.words for column in used]
+        cells = [[column.head for column in used], *([column.cell(row) for column in used] for row in rows)]
+        shown = align(_folded(cells, words) if width is None else cells, words)
         last = max(used, key=lambda column: column.rank)
         if width is None or not last.rank or max(map(len, shown.splitlines())) <= width:
             break
         used = [column for column in used if column is not last]
     heads = [column.head for column in able if column not in used]
     return shown, f"with --wide also: {', '.join(heads)}" if heads else ""
+
+
+def _folded(rows: Sequence[Sequence[str]], words: Sequence[bool]) -> list[list[str]]:
+    """Rows of text whose longest columns of `words` are folded, so that they fit a line of `WIDE` characters."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    while sum(widths) + 2 * (len(widths) - 1) > WIDE:
+        longest = max((width, k) for k, width in enumerate(widths) if words[k] or not k)[1]
+        if widths[longest] <= _LEAST:
+            break
+        widths[longest] -= 1
+    lines = []
+    for row in rows:
+        folded = ([cell] if len(cell) <= w else textwrap.wrap(cell, w) for cell, w in zip(row, widths, strict=True))
+        lines += [list(line) for line in zip_longest(*folded, fillvalue="")]
+    return lines
 
 
 def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:

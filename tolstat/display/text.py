@@ -110,6 +110,11 @@ def number(x: float) -> str:
     return f"{float(short):.0f}" if "e+" in short and abs(x) < 1e7 else short
 
 
+def several(n: int, noun: str) -> str:
+    """Number of things: ``1 joint``, ``2 joints``."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def span_of(low: float, high: float, unit: str) -> str:
     """Format an interval of loads with its unit; NaN gives a dash."""
     if math.isnan(low):

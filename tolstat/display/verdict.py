@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from tolstat.common.counts import POWER
 from tolstat.display import table, text
 
 WORDS = {
@@ -15,6 +16,8 @@ WORDS = {
     "none": "no verdict",
 }
 """Answers in words."""
+FEW = 20
+"""Number of joints below which their share is no guess of the true one, to say how many joints decide."""
 
 
 class Verdict(NamedTuple):
@@ -82,17 +85,21 @@ def side_of(interval: Sequence[float], accepted: float) -> str:
     return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
-def deciding(bounds: tuple[float, float], accepted: float, needed: Callable[[float], float]) -> str:
-    """Words on the number of joints whose interval excludes the accepted share.
+def deciding(bounds: tuple[float, float], accepted: float, n: int, needed: Callable[[float], float]) -> str:
+    """Words on the number of joints that decide on which side of the accepted share a share is.
 
-    `needed` gives that number if their share stayed at the end of the `bounds` that is nearer to the accepted share;
-    none helps where that lies between them.
+    `needed` gives that number for a true share; assumed is the end of the `bounds` of the share of `n` joints that is
+    nearer to the accepted share. None helps where that lies between them.
     """
     low, high = bounds
     if low <= accepted <= high:
         return "no number of joints would decide it"
-    joints = needed(high if high < accepted else low)
-    return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
+    if n < FEW:
+        return f"{n} joint{' is' if n == 1 else 's are'} too few to say how many would decide it"
+    joints = needed(share := high if high < accepted else low)
+    number = f"{text.number(joints)} joints" if joints < 1e7 else "more than 1e7 joints"
+    lost = ", joints without a valid load included," if low < high else ""
+    return f"{number} decide it in {100 * POWER:.0f} % of campaigns if {text.percent(share)}{lost} is the true share"
 
 
 def on_share(
@@ -119,7 +126,7 @@ def on_share(
     accepted : float
         Accepted share; NaN if none is given.
     needed : callable
-        Gives the number of joints whose interval excludes the accepted share if theirs stayed at the share given.
+        Gives the number of joints that decide if a share is the true one, see `deciding`.
     reason : str
         Why the share has no interval; empty if it has one.
     undecided : str
@@ -141,6 +148,6 @@ def on_share(
         lost = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = row.get("bound_lower", share * (1.0 - lost))
         high = row.get("bound_upper", share * (1.0 - lost) + lost)
-        answer, words = "open", f"{told}; {most} is accepted; {deciding((low, high), accepted, needed)}"
+        answer, words = "open", f"{told}; {most} is accepted; {deciding((low, high), accepted, row['n'], needed)}"
     value = text.capital(WORDS[answer]) if answer else (numbers or ["-"])[0]
     return Verdict(answer, value, words, about=about, share=share, lower=ends[0], upper=ends[1])

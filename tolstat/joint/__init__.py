@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from tolstat.joint.model import Joint as Joint
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
-    from tolstat.joint.perturbation import MEANS as MEANS
-    from tolstat.joint.perturbation import SPLINE as SPLINE
-    from tolstat.joint.perturbation import Operation as Operation
-    from tolstat.joint.perturbation import OperationOfLinkage as OperationOfLinkage
-    from tolstat.joint.perturbation import OperationOfShaft as OperationOfShaft
-    from tolstat.joint.perturbation import mechanism_of as mechanism_of
+    from tolstat.joint.operation import MEANS as MEANS
+    from tolstat.joint.operation import SPLINE as SPLINE
+    from tolstat.joint.operation import Operation as Operation
+    from tolstat.joint.operation import OperationOfLinkage as OperationOfLinkage
+    from tolstat.joint.operation import OperationOfShaft as OperationOfShaft
+    from tolstat.joint.operation import joints_of as joints_of
+    from tolstat.joint.operation import mechanism_of as mechanism_of
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
@@ -31,10 +32,11 @@ _HOMES = {
     "bearing": ("Bearing",),
     "linkage": ("Linkage",),
     "model": ("affecting_results", "affects_results", "Joint"),
-    "perturbation": (
+    "operation": (
         *("MEANS", "SPLINE", "Operation", "OperationOfLinkage", "OperationOfShaft"),
-        *("mechanism_of", "nominal_errors", "operating", "perturb"),
+        *("joints_of", "mechanism_of"),
     ),
+    "perturbation": ("nominal_errors", "operating", "perturb"),
     "reading": ("load", "varied"),
     "shaft": ("DriveShaft",),
 }

@@ -130,7 +130,11 @@ class Linkage(Strict):
                 yield f"member.{name}", "has no effect: the drive holds it, like the end of a motor's shaft", remedy
         for name in in_pairs:
             if name not in (GROUND, held, *self.member):
-                yield f"member.{name}", "missing table: a pair names it", "give mass, centre and inertia, or mend the pair"
+                yield (
+                    f"member.{name}",
+                    "missing table: a pair names it",
+                    "give mass, centre and inertia, or mend the pair",
+                )
         if held and None in (self.drive.point, self.drive.axis):
             found = f"has no axis: {driven} has no pair in the ground"
             yield "drive", found, 'give point = ["0 mm", "0 mm", "0 mm"] and axis = [0, 0, 1], of yours'
@@ -198,7 +202,7 @@ def _chain_of(text: str) -> Chain:
 
 def unit(direction: tuple[float, float, float]) -> Array:
     """Unit vector."""
-    return np.array(direction) / np.linalg.norm(direction)
+    return np.asarray(np.array(direction) / np.linalg.norm(direction))
 
 
 def triad(axis: Array, t: tuple[float, float, float] | None = None) -> Array:
@@ -209,5 +213,3 @@ def triad(axis: Array, t: tuple[float, float, float] | None = None) -> Array:
             across /= np.linalg.norm(across)
             return np.array([axis, across, np.cross(axis, across)])
     raise AssertionError("one of x and y is across")
-
-

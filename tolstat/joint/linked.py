@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tolstat.common.mechanism import (
     DRIVEN,
@@ -29,6 +30,7 @@ from tolstat.joint.linkage import ENDS, GRAVITY, Linkage, triad, unit
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 
+Table = NDArray[np.void]
 LINKAGE = "linkage"
 """Name of all mechanisms that a file describes, with those of `PARTS` that the joint gives them after it."""
 PARTS = ("thrust", "friction")
@@ -82,7 +84,7 @@ def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
 
 
 def linkage_mechanism(linkage: Linkage, parts: Collection[str]) -> Mechanism:
-    """Mechanism of a linkage whose pins and eyes are those of a joint with these parts; other than `PARTS` play none."""
+    """Mechanism of a linkage with pins and eyes of a joint that has these parts; others than `PARTS` play none."""
     return _mechanism(linkage.model_dump_json(), tuple(part for part in PARTS if part in parts))
 
 
@@ -92,7 +94,7 @@ def named(name: str, linkage: Mapping[str, Any]) -> Mechanism:
 
 
 def frames(chain: Chain) -> dict[str, tuple[Array, Array]]:
-    """Axes, by columns, and origin of each member at the angle zero, in ground axes: z is the axis that it turns about."""
+    """Axes, by columns, and origin of each member at the angle zero, in ground axes; it turns about its z."""
     found = {GROUND: (np.eye(3), np.zeros(3))}
     for name, of in chain.members.items():
         z, x, y = triad(of.axis)
@@ -100,10 +102,10 @@ def frames(chain: Chain) -> dict[str, tuple[Array, Array]]:
     return found
 
 
-def constants(linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str, Any]:
-    """Parameters of a linkage that the errors of its pins and eyes do not change, at factor 1 on E."""
+def write(params: Table, linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str, Array]:
+    """Write parameters of all members, at factor 1 on E; return triads as `bodies.write`."""
     chain, at = linkage.chain, frames(linkage.chain)
-    of: dict[str, Any] = {name: [] for name in ("mount", "pivot", "angle", "wave")}
+    of: dict[str, Any] = {name: [] for name in ("mount", "pivot", "angle", "wave", "k", "c", "marker")}
     for member in mechanism.members:
         axes, origin = at[member.name]
         above, start = at[member.parent or GROUND]
@@ -121,7 +123,6 @@ def constants(linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str,
     of["triad"] = [triads[lump.name] for lump in mechanism.lumps]
     of["mass"], of["inertia"] = ([bodies[name][i] for name in mechanism.lump_kinds] for i in (0, 1))
     of["at"] = [triads[name] @ points[name] for name in mechanism.lump_kinds]
-    of["k"], of["c"], of["marker"] = [], [], []
     for bushing in mechanism.bushings:
         mass, inertia = bodies[bushing.lump]
         k = _stiffness(joint, bushing.group, triads[bushing.lump])
@@ -129,7 +130,9 @@ def constants(linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str,
         of["k"].append(k)
         of["c"].append(material.bushing_damping(k, mass, np.array(inertia), joint.bushing.xi))
         of["marker"].append(((0.0, 0.0, 0.0), triads[bushing.lump] @ lever))
-    return of
+    for name, values in of.items():
+        params[name] = values
+    return triads
 
 
 def added_clearances(linkage: Linkage, joint: Joint) -> list[float]:

@@ -1,137 +1,32 @@
-"""Operating point, nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
+"""Nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema
 
-from tolstat.common import units
-from tolstat.common.cardan import ARM_QUARTERS, CARDAN, MECHANISMS, PIN_QUARTERS, named
-from tolstat.common.loads import split
-from tolstat.common.mechanism import OBLIQUE, Mechanism
+from tolstat.common.mechanism import Mechanism, prefixes, with_play
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict
 from tolstat.common.tables import FACTORS, blank_params, tables
-from tolstat.joint import linked, material, orders
+from tolstat.joint import bodies, linked, orders
 from tolstat.joint.contact import Contact
-from tolstat.joint.linkage import Linkage
-from tolstat.joint.linked import linkage_mechanism
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import RIGID, Arm, Hub, Pin, Unbalance
-from tolstat.joint.shaft import DriveShaft, Lumped, check_misalignment
+from tolstat.joint.operation import (
+    MEANS,
+    SPLINE,
+    Operation,
+    OperationOfLinkage,
+    joints_of,
+    mechanism_of,
+    shaft_of,
+    unbalances,
+)
 from tolstat.joint.spline import Spline
 
 Table = NDArray[np.void]
-
-
-def _triads(quarters: Sequence[int]) -> Array:
-    """Rows e, t, z of triads after quarter turns about z, (n, 3, 3)."""
-    e = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])[list(quarters)]
-    z = np.tile((0.0, 0.0, 1.0), (len(e), 1))
-    return np.stack([e, np.cross(z, e), z], axis=1)
-
-
-PIN_TRIADS: Array = _triads(PIN_QUARTERS)
-"""Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
-
-ARM_TRIADS: Array = _triads(ARM_QUARTERS)
-"""Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
-
-
-class Operation(Strict):
-    """Operating point of the joint."""
-
-    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["15 deg"])
-    """misalignment of the shafts, below 90 deg"""
-    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["500 rpm"])
-    """speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns the other way"""
-    torque: units.Torque = Field(examples=["100 N*m"])
-    """resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; negative: drives the
-    output shaft"""
-    axial_force: units.Force = Field(default=0.0, examples=["500 N"])
-    """axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint"""
-    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
-    """orders of the speed, { n, amplitude, phase } each"""
-    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
-    """orders of the resisting torque, { n, amplitude, phase } each"""
-
-    _split = model_validator(mode="before")(orders.split)
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """Misalignment of each joint (rad)."""
-        return (self.alpha,)
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return the JSON schema of the table as a file writes it."""
-        schema = super().__get_pydantic_json_schema__(core, handler)
-        orders.join_schemas(handler.resolve_ref_schema(schema)["properties"])
-        return schema
-
-
-class OperationOfShaft(Operation):
-    """Operating point of a drive shaft; `alpha` is that of joint 1."""
-
-    shaft: DriveShaft
-    """joint 2 and the tubes"""
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """See `Operation.alphas`."""
-        return self.alpha, self.shaft.alpha
-
-
-class OperationOfLinkage(Operation):
-    """Operating point of a linkage: speed of its drive, in periods of a swing that turns to and fro, and torque."""
-
-    alpha: float = Field(default=0.0, exclude=True)
-    axial_force: float = Field(default=0.0, exclude=True)
-    torque: units.Torque = Field(default=0.0, examples=["100 N*m"])
-    """torque on the member that is `loaded`, against its axis"""
-    linkage: Linkage
-    """the linkage"""
-
-    @property
-    def alphas(self) -> tuple[float, ...]:
-        """See `Operation.alphas`."""
-        return ()
-
-
-MEANS = ("alpha", "speed", "torque", "axial_force")
-"""Numbers of an operating point; errors of it are deviations from them."""
-SPLINE = "shaft.spline"
-"""Error of what has a `spline.Spline`: its axial force as a share of the largest one, from -1 to 1."""
-
-
-def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:
-    """What is simulated: a joint, a drive shaft or a linkage, with the parts that the joint has."""
-    if isinstance(operation, OperationOfLinkage):
-        return linkage_mechanism(operation.linkage, joint.parts)
-    shaft = _shaft_of(operation)
-    base = CARDAN if shaft is None else shaft.mechanism
-    return MECHANISMS[named(base, joint.parts if shaft is None else (*joint.parts, *shaft.parts))]
-
-
-def unbalances(joint: Joint, operation: Operation) -> dict[str, tuple[Unbalance | None, float | None]]:
-    """Unbalance of each body that may have one, and the mass of the body (kg)."""
-    shaft = _shaft_of(operation)
-    tubes = {} if shaft is None else shaft.tubes
-    return {name: (tube.unbalance, tube.mass) for name, tube in tubes.items()} | {
-        "output": (joint.shaft.unbalance, joint.shaft.mass)
-    }
-
-
-def _shaft_of(operation: Operation) -> DriveShaft | None:
-    return operation.shaft if isinstance(operation, OperationOfShaft) else None
 
 
 def nominal_errors(n: int, mechanism: Mechanism) -> Table:
@@ -158,10 +53,9 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    deviations = errors.dtype.names or ()
     values = {name: np.full(len(errors), getattr(operation, name)) for name in MEANS}
     for name in MEANS:
-        if f"operation.{name}" in deviations:
+        if f"operation.{name}" in (errors.dtype.names or ()):
             values[name] += errors[f"operation.{name}"]
     if spline is not None:
         values["axial_force"] = values["axial_force"] + _sticking(errors, spline, values["torque"])
@@ -184,9 +78,9 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     Parameters
     ----------
     joint : Joint
-        The nominal joint.
+        The nominal joint; of a drive shaft joint 1.
     operation : Operation
-        The operating point; errors of it are deviations that are added.
+        The operating point, which has joint 2 if that differs; errors of it are deviations that are added.
     errors : ndarray, shape (n,), dtype ERROR
         Row i holds the errors of joint i.
 
@@ -197,43 +91,44 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """
     mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
-    shaft = _shaft_of(operation)
-    for name, value in _constants(joint).items():
-        params[name] = value
-    closed = isinstance(operation, OperationOfLinkage)
-    point = operating(operation, errors, None if closed else joint.shaft.spline)
-    params["omega"], params["torque"] = point["speed"], point["torque"]
-    own = [0.0] * len(mechanism.pairs)
+    own = dict(zip(prefixes(mechanism) or ("",), joints_of(joint, operation), strict=True))
+    for k, each in enumerate(own.values()):
+        for name, value in _of_pairs(each).items():
+            params[name][:, k] = value
+        if each.friction.mu is not None:
+            params["mu"][:, k] = each.friction.mu + errors["friction.mu"]
+    *_, last = own.values()
+    shaft, slack = shaft_of(operation), [0.0] * len(mechanism.pairs)
     if isinstance(operation, OperationOfLinkage):
-        own = linked.added_clearances(operation.linkage, joint)
-        for name, value in linked.constants(operation.linkage, joint, mechanism).items():
-            params[name] = value
-        triads = dict(zip((lump.name for lump in mechanism.lumps), params["triad"][:1].swapaxes(0, 1), strict=True))
+        point, slack = operating(operation, errors), linked.added_clearances(operation.linkage, joint)
+        triads = linked.write(params, operation.linkage, joint, mechanism)
     else:
-        triads = _of_joints(joint, shaft, errors, mechanism, params)
+        point = operating(operation, errors, last.shaft.spline)
+        triads = bodies.write(params, own, shaft, errors, mechanism)
         params["alpha"][:, 0] = point["alpha"]
-    if joint.shaft.slides and not closed:
-        params["F_a"] = point["axial_force"]
+        if last.shaft.slides:
+            params["F_a"] = point["axial_force"]
+    params["omega"], params["torque"] = point["speed"], point["torque"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
     for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
         params[name] = value
     factor = errors["material.E_factor"]
     params["k"] *= factor[:, None, None]
     for name in ("station_k1", "station_k2", "station_k3"):
-        params[name] *= factor[:, None]
+        params[name] *= factor[:, None, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         params["c"] *= np.sqrt(factor)[:, None, None]
-    for i, (pin, hole, _) in enumerate(mechanism.pairs):
+    held = {}
+    for i, (pin, hole, _, kind) in enumerate(mechanism.pairs):
+        held[pin] = own[kind.removesuffix("bearing")]
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
-        deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"] + own[i])
-        params["clearance"][:, i] = _clearance(joint.contact, *deviations)
-    if joint.thrust is not None:
-        half = 0.5 * joint.contact.z
-        for i, face in enumerate(mechanism.faces):
-            own = f"{face.name.rstrip('1234')}.end_play" if mechanism.cardan else f"{face.pin}.end_play"
-            play = joint.thrust.end_play + errors[own]
-            params["face_at"][:, i] = face.end * np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
+        deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"] + slack[i])
+        params["clearance"][:, i] = _clearance(held[pin].contact, *deviations)
+    for i, face in enumerate(mechanism.faces):
+        half, thrust = 0.5 * held[face.pin].contact.z, held[face.pin].thrust
+        play = (thrust.end_play if thrust else 0.0) + errors[f"{with_play(mechanism, face)}.end_play"]
+        params["face_at"][:, i] = face.end * np.stack(np.broadcast_arrays(half, half + 0.5 * play), axis=-1)
     if shaft is not None and shaft.spline is not None:
         params["push"] = _sticking(errors, shaft.spline, point["torque"])
     of_bodies = unbalances(joint, operation)
@@ -242,33 +137,11 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         size = (unbalance.size(mass) if unbalance else 0.0) + errors[f"{body}.unbalance"]
         angle = (unbalance.angle or 0.0 if unbalance else 0.0) + errors[f"{body}.unbalance_angle"]
         params["unbalance"][:, i] = (size * np.array([np.cos(angle), np.sin(angle)])).T
-    if joint.friction.mu is not None:
-        params["mu"] = joint.friction.mu + errors["friction.mu"]
     return params
 
 
-def _of_joints(
-    joint: Joint, shaft: DriveShaft | None, errors: Table, mechanism: Mechanism, params: Table
-) -> dict[str, Array]:
-    """Write what is of Cardan joints alone; return the triads of their lumps, rows e, t, z in axes of the member."""
-    for name, value in _of_ends(joint).items():
-        params[name] = value
-    for name, of_kinds in _of_kinds(joint, shaft).items():
-        kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
-        params[name] = [of_kinds[kind] for kind in kinds]
-    lumps = mechanism.lumps
-    triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
-    if shaft is not None:
-        params["plane"][:, 1], params["span"][:, 1] = shaft.plane, shaft.length
-        params["alpha"][:, 1] = shaft.alpha + errors["shaft.alpha"]
-        params["ahead"][:, 1] = 0.5 * np.pi + shaft.offset + errors["shaft.offset"]
-        triads |= _on_tube(params["ahead"][:, 1] + shaft.plane)
-        params["triad"] = np.stack(np.broadcast_arrays(*(triads[lump.name] for lump in lumps)), axis=1)
-    return triads
-
-
-def _constants(joint: Joint) -> dict[str, Any]:
-    """Parameters of pins in their holes that do not depend on the errors, at factor 1 on E."""
+def _of_pairs(joint: Joint) -> dict[str, Any]:
+    """Parameters of the pins of a joint in their holes, at factor 1 on E."""
     contact, stations = joint.contact, joint.contact.springs(joint.bearing)
     unused = (0, MAX_STATIONS - len(stations.s))
     return {
@@ -288,85 +161,6 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "station_weight": np.pad(stations.weight, unused),
         "needle_b": stations.b,
     }
-
-
-def _of_ends(joint: Joint) -> dict[str, Any]:
-    """Parameters of the shafts at both ends, and of the cross."""
-    shaft = joint.shaft
-    return {
-        "R": joint.cross.R,
-        "Js": shaft.Js,
-        "bearing_at": np.reshape(
-            [
-                sign * np.array(ends.bearings)
-                for sign, ends in ((-1.0, shaft.input), (1.0, shaft.output))
-                if ends is not None
-            ],
-            (-1, 2),
-        ),
-        "slides": shaft.slides,
-        "m_s": shaft.mass if shaft.slides or shaft.lateral != RIGID else 0.0,
-        "k_l": shaft.k_l,
-        "c_l": 2 * joint.bushing.xi * math.sqrt(shaft.k_l * (shaft.mass or 0.0)),
-        "k_a": shaft.k_a,
-        "c_a": shaft.axial_damping if shaft.slides else 0.0,
-    }
-
-
-OF_LUMPS = ("mass", "inertia", "at")
-"""Parameters of kinds of lumps; others of `_of_kinds` are of kinds of bushings."""
-
-
-def _of_kinds(joint: Joint, shaft: DriveShaft | None) -> dict[str, dict[str, Any]]:
-    """Parameters of lumps and bushings by kind, at factor 1 on E, in a joint or in a drive shaft."""
-    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
-    of: dict[str, dict[str, Any]] = {name: {} for name in (*OF_LUMPS, "k", "c", "marker")}
-
-    def lump(kind: str, body: Hub | Pin | Arm | Lumped, at: tuple[float, float, float]) -> None:
-        of["mass"][kind], of["inertia"][kind], of["at"][kind] = body.mass, body.inertia, at
-
-    def bushing(kind: str, k: Array, body: Pin | Arm | Lumped, markers: Sequence[tuple[float, float, float]]) -> None:
-        damping = material.bushing_damping(k, body.mass, np.array(body.inertia), joint.bushing.xi)
-        of["k"][kind], of["c"][kind], of["marker"][kind] = k, damping, markers
-
-    tubes = {} if shaft is None else shaft.tubes
-    # distance of the base's reference point from the joint's centre, along the base
-    ends = {"input": 0.0, "output": 0.0}
-    if shaft is not None:
-        at = [tube.at for tube in tubes.values()]
-        ends = {
-            "joint1.input": 0.0,
-            "joint1.output": at[0],
-            "joint2.input": at[-1] - shaft.length,
-            "joint2.output": 0.0,
-        }
-    for end, base in ends.items():
-        prefix = end.removesuffix("input").removesuffix("output")
-        side = -1.0 if end.endswith("input") else 1.0
-        lump(f"{prefix}hub", joint.hub, (0.0, 0.0, 0.0))
-        lump(f"{prefix}pin", joint.pin, (R, 0.0, 0.0))
-        lump(f"{prefix}arm", joint.arm, (R, 0.0, 0.0))
-        bushing(f"{prefix}cross", joint.k_cross, joint.pin, [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)])
-        fork = [(0.0, 0.0, side * l_f), (R, 0.0, side * l_f - base)]
-        bushing(f"{end} fork", joint.k_fork, joint.arm, fork)
-    if shaft is not None:
-        lump("joint2.arm of tube", joint.arm, (R, 0.0, shaft.length))
-        for name, tube in tubes.items():
-            lump(name, tube, (0.0, 0.0, tube.at))
-        if spline := shaft.spline:
-            k = np.array([*[spline.k_lateral] * 2, 0.0, *[spline.k_bending] * 2, spline.k_torsion])
-            places = [(0.0, 0.0, spline.at - tubes[name].at) for name in ("tube2", "tube1")]
-            bushing("spline", k, tubes["tube2"], places)
-            of["c"]["spline"][2] = spline.axial_damping
-    return of
-
-
-def _on_tube(turned: Array) -> dict[str, Array]:
-    """Triads, (n, 3, 3) each, of the arms of joint 2 in axes of the tube; `turned`: about the tube, rad, (n,)."""
-    zero, one = np.zeros_like(turned), np.ones_like(turned)
-    cosine, sine = np.cos(turned), np.sin(turned)
-    attitude = np.moveaxis(np.array([[cosine, -sine, zero], [sine, cosine, zero], [zero, zero, one]]), -1, 0)
-    return {f"joint2.hole{i}": np.einsum("nij,aj->nai", attitude, ARM_TRIADS[i - 1]) for i in (1, 2)}
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
@@ -394,35 +188,3 @@ def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> A
     clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + deviation
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
     return np.asarray(clearance)
-
-
-@cache
-def _pin_of_load(mechanism: Mechanism) -> dict[str, str]:
-    """Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
-    pin_of_lump = {lump: pair.pin for pair in mechanism.pairs for lump in (pair.pin, pair.hole)}
-    forces = {f"{b.name}.F": pin_of_lump[b.lump] for b in mechanism.bushings if b.lump in pin_of_lump}
-    return forces | {f"{pair.pin}.contact": pair.pin for pair in mechanism.pairs}
-
-
-def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str, mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Rows of limits for people: one for all loads that are the same force and have the same limit.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Rows with ``load``, the key `level` of the limit, and the key `size`.
-    level, size : str
-        Of the rows of one force, that of the largest `size` is shown, with the names of all in ``load``.
-    mechanism : Mechanism
-        Whose loads they are.
-    """
-    by_force: dict[Any, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        name, points = split(row["load"])
-        pin = _pin_of_load(mechanism).get(name)
-        force = row["load"] if pin is None else (pin, points, row[level])
-        by_force.setdefault(force, []).append(row)
-    return [
-        {**max(same, key=lambda row: row[size]), "load": ", ".join(row["load"] for row in same)}
-        for same in by_force.values()
-    ]

@@ -7,19 +7,30 @@ from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializationInfo,
+    ValidationInfo,
+    WithJsonSchema,
+    field_serializer,
+    model_validator,
+)
 
 from tolstat.common import units
-from tolstat.common.cardan import CARDAN, MECHANISMS, SHAFT, SPLINED, named
+from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
 from tolstat.common.mechanism import Mechanism
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, refuse, validate
 from tolstat.common.units import POSITIVE
 from tolstat.joint.material import Array
+from tolstat.joint.model import Joint
 from tolstat.joint.sections import Length, Stiffness, Unbalance
 from tolstat.joint.spline import Spline
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
+OF_FIRST, OF_SECOND = {"thrust", "friction", "input_bearings"}, {*PARTS} - {"input_bearings"}
+"""Parts that joint 1 gives a drive shaft, and those that joint 2 gives it."""
 STEEL = 7850.0
 """Density of a tube that is given by its section, kg/m^3."""
 
@@ -101,12 +112,20 @@ class SplineOfTubes(Spline):
     """damping of the motion along it"""
 
 
-def by_keys(shaft: object, parts: Collection[str]) -> Mechanism:
-    """What is simulated with a `[shaft]` as a study writes it, None without, with some of `cardan.PARTS`."""
+def of_joints(first: Collection[str], second: Collection[str]) -> set[str]:
+    """Parts of a drive shaft by those of its joints: its first shaft is that of joint 1, its last that of joint 2."""
+    return OF_FIRST.intersection(first) | OF_SECOND.intersection(second)
+
+
+def by_keys(shaft: object, first: Collection[str], second: Collection[str]) -> Mechanism:
+    """What is simulated with a `[shaft]` as a study writes it, None without, with the parts of its joints."""
+    if shaft is None:
+        return MECHANISMS[named(CARDAN, first)]
     keys = shaft if isinstance(shaft, Mapping) else {}
-    base = CARDAN if shaft is None else SPLINED if "spline" in keys else SHAFT
-    unbalanced = any("unbalance" in tube for tube in keys.values() if isinstance(tube, Mapping))
-    return MECHANISMS[named(base, (*parts, "unbalance") if unbalanced else parts)]
+    tubes = [keys.get(name) for name in ("tube", "tube2")]
+    unbalanced = {"unbalance"} if any(isinstance(tube, Mapping) and "unbalance" in tube for tube in tubes) else set()
+    parts = of_joints(first, second if "joint2" in keys else first) | unbalanced
+    return MECHANISMS[named(SPLINED if "spline" in keys else SHAFT, parts)]
 
 
 class Lumped(NamedTuple):
@@ -119,7 +138,7 @@ class Lumped(NamedTuple):
 
 
 class DriveShaft(Strict):
-    """Drive shaft of two joints: the second one, and what is between them. Both are the joint of the study."""
+    """Drive shaft of two joints: the second one, and what is between them. Joint 1 is that of [joint]."""
 
     alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["6 deg"])
     """misalignment of joint 2, below 90 deg; that of joint 1 is `operation.alpha`"""
@@ -137,6 +156,14 @@ class DriveShaft(Strict):
     """The tube of joint 2, where a spline is; when left out: like that of joint 1"""
     spline: SplineOfTubes | None = None
     """Spline between two tubes; without it there is one tube"""
+    joint2: Annotated[Joint | None, WithJsonSchema({"type": "object", "x-table": "overrides"})] = Field(
+        default=None, examples=[{"base": "pin25", "contact": {"clearance": "0.02 mm"}}]
+    )
+    """joint 2, as `[joint]` is joint 1, with a `base` of its own; when left out: like joint 1"""
+
+    @field_serializer("joint2")
+    def _as_given(self, joint2: Joint | None, info: SerializationInfo) -> dict[str, Any] | None:
+        return None if joint2 is None else joint2.given("json" if info.mode == "json" else "python")
 
     @model_validator(mode="after")
     def _fits(self) -> DriveShaft:
@@ -157,6 +184,8 @@ class DriveShaft(Strict):
         made: dict[str, Strict] = {key: Tube.of(values[key]) for key in ("tube", "tube2") if values.get(key)}
         if values.get("spline"):
             made["spline"] = SplineOfTubes.model_construct(**values["spline"])
+        if values.get("joint2"):
+            made["joint2"] = validate(Joint, values["joint2"], "shaft.joint2", context={"si": True})
         return cls.model_construct(**{**values, **made})
 
     @property
@@ -168,13 +197,13 @@ class DriveShaft(Strict):
 
     @property
     def mechanism(self) -> Mechanism:
-        """What is simulated, without what the joints have beside."""
+        """What is simulated, without what its joints have beside."""
         return SHAFT if self.spline is None else SPLINED
 
-    @property
-    def parts(self) -> tuple[str, ...]:
-        """Those of `cardan.PARTS` that its tubes give it."""
-        return ("unbalance",) if any(tube.unbalance for tube in self.tubes.values()) else ()
+    def parts(self, first: Joint) -> set[str]:
+        """Those of `cardan.PARTS` that joint 1, `first`, joint 2 and the tubes give it."""
+        of_tubes = {"unbalance"} if any(tube.unbalance for tube in self.tubes.values()) else set()
+        return of_joints(first.parts, (self.joint2 or first).parts) | of_tubes
 
     @property
     def plane(self) -> float:

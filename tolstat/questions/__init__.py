@@ -106,7 +106,7 @@ QUESTIONS = (
     Question("failed", "", "List joints without a valid load, and compare their errors.", "open", "joints"),
     Question("assumptions", "Read", "Compute what the verdict stands on.", "folded", "assumptions.answer"),
     Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
-    Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
+    Question("capability", "Read", "Compute yield and Ppk against each limit of the study.", "folded", counted=True),
     Question("causes", "Read", "Compute which tolerances and errors cause a load.", "folded", "causes.errors"),
     Question("worst", "Read", "List the joints with the largest load and their errors.", "folded", "causes.worst"),
     Question("drawings", "", "Draw the joint, its errors and its worst rows.", "folded", "drawings.answer"),

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from tolstat.analysis import accuracy as comparison
-from tolstat.common.columns import DRAWN
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray, load_of, units_of_loads
 from tolstat.common.mechanism import Mechanism
@@ -119,7 +118,7 @@ def joint_rows(verification: Verification, mechanism: Mechanism) -> Rows:
 
 def error_of_view(view: View, checks: Verification) -> str:
     """Sentence on the numerical error of a campaign from its `checks`, and on that near its limits."""
-    words, near = error_note(checks, view.mechanism, view.limits, view.method in DRAWN), view.near
+    words, near = error_note(checks, view.mechanism, view.limits, view.method == "random"), view.near
     known = _known(near, view.mechanism, view.limits) if near else {}
     if near is None or not known:
         return words

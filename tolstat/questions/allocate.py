@@ -390,5 +390,5 @@ def simulate(
             return simulation.altered
 
         _Run(view, request, simulation.altered, more)
-        work.tell(f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s")
+        work.tell(f"simulated {text.several(simulation.simulated, 'joint')} in {time.monotonic() - begin:.0f} s")
     return [path]

@@ -1,4 +1,4 @@
-"""Capability of a production against the limits of its study, and its rare loads."""
+"""How a production stands against the limits of its study, and its rare loads."""
 
 from __future__ import annotations
 
@@ -21,11 +21,6 @@ from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
 
-NOT_NORMAL = 0.01
-"""p-value of the test of normality below which the index of a normal load tells no share above the limit."""
-LEAST_INDEX = indices.FEWEST_MOMENTS
-"""Minimum number of valid joints for the estimate of an index: the 99.865 % quantile lies beyond fewer ones, and the
-index of mean and standard deviation has no interval."""
 ON_PAGE = (1e3, 1e4, 1e5)
 """Numbers of joints of which one exceeds the rare loads on the page."""
 FIGURES = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
@@ -41,9 +36,8 @@ LIMITS = (
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
     Column("above in delivery", text.delivery, rank=3),
-    Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
-    Column("interval of Cpk", lambda row: _ends_of_cpk(row)),
-    Column("Cpk by sigma", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
+    Column("Ppk", lambda row: text.formed(row["ppk"], ".2f")),
+    Column("interval of Ppk", lambda row: _ends_of_ppk(row)),
 )
 """Columns of the table ``limits``; the total interval is that of the yield."""
 LOTS = (
@@ -69,11 +63,11 @@ def capability(
     one_in: Annotated[list[float] | None, Opt("N", least=1)] = None,
     delivery: Delivery = DELIVERY,
 ) -> Answer:
-    """Compute yield and Cpk against each limit of the study.
+    """Compute yield and Ppk against each limit of the study.
 
-    Gives for each limit, and for all limits together, the share of joints below it (yield) and the process capability
-    index Cpk, each with its 95 % interval; with --wide or --json also a prediction interval for the number of joints
-    above the limit in the next delivery. Where joints share lots, gives the shares of the lots, too.
+    Gives for each limit, and for all limits together, the share of joints below it (yield) and the performance index
+    Ppk of ISO 22514-2, each with its 95 % interval; with --wide or --json also a prediction interval for the number of
+    joints above the limit in the next delivery. Where joints share lots, gives the shares of the lots, too.
 
     With --one-in N, gives also the load that one in N joints exceeds, from the joints in their order: N is at most
     their number. Beyond, tolstat rare simulates the joints that matter.
@@ -105,7 +99,7 @@ def capability(
         When N is not above one.
     """
     if not view.limits or view.method in ("sweep", "cases"):
-        remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
+        remedy = 'give the result file of a study with [limits] and sampling.method = "random"'
         raise shares.inapplicable(view, "has no limits, or its joints are no random sample", remedy)
     view.check()
     rows = limit_rows(view, delivery)
@@ -113,16 +107,16 @@ def capability(
     parts += of_lots(view, delivery)
     notes = [Sentence(note) for note in (*_notes(rows), error_budget.unknown(view)) if note]
     if not one_in:
-        return Answer("capability", "Capability", [*parts, *notes])
+        return Answer("capability", "Yield and Ppk", [*parts, *notes])
     if min(one_in) <= 1.0:
         raise InputError([Fault("--one-in", f"{min(one_in):g} is not above one", "give the number of joints N")])
     rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
     parts += [Table("one_in", RARE, RETURNS, rare), *notes, *_beyond(view, rare)]
-    return Answer("capability", "Capability and rare loads", parts)
+    return Answer("capability", "Yield, Ppk and rare loads", parts)
 
 
 def capability_on_page(view: View, asked: Asked) -> Answer:
-    """Capability against the limits, if there are any, and rare loads of the leading loads."""
+    """Yield and Ppk against the limits, if there are any, and rare loads of the leading loads."""
     if not (view.sampled and view.count(*VALID)) or view.design.refuses():
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
@@ -131,11 +125,11 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
         parts += [Table("one_in", RARE, RETURNS, rows), *_beyond(view, rare)]
     if not parts:
         raise NotApplicable
-    return Answer("capability", "Capability and rare loads" if view.limits else "Rare loads", parts)
+    return Answer("capability", "Yield, Ppk and rare loads" if view.limits else "Rare loads", parts)
 
 
 def limit_rows(view: View, delivery: int = DELIVERY) -> Rows:
-    """Capability against each limit, and against all limits together.
+    """Yield and Ppk against each limit, and against all limits together.
 
     Parameters
     ----------
@@ -147,24 +141,20 @@ def limit_rows(view: View, delivery: int = DELIVERY) -> Rows:
     Returns
     -------
     sequence of mapping
-        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
-        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
-        and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
-        ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
-        delivery. The last row, `ANY_LIMIT`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
-        NaN where the load has a long tail (`analysis.capability.LONGEST_TAIL`), both indices where unresolved joints
-        matter (`analysis.binomial.unresolved_matter`), and their estimates for fewer than `LEAST_INDEX` valid joints.
+        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above,
+        or ``scrap``); ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling,
+        unresolved joints and, if known, the numerical error; ``ppk`` with its ends, ``needed``, see
+        `analysis.capability.Performance`;
+        ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the delivery. The last
+        row, `ANY_LIMIT`, is for the largest ratio of load to limit of each joint. ``ppk`` is NaN where unresolved
+        joints matter (`analysis.binomial.unresolved_matter`).
     """
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
         row = dict(shares.good(view, load.name, delivery))
         index = indices.of_sample(load, row["limit"])
-        both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
-        if load.valid.size < LEAST_INDEX:
-            both |= dict.fromkeys(("cpk", "cpk_normal"), np.nan)
-        if shares.unresolved_matter(row):
-            both = dict.fromkeys(both, np.nan)
-        rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
+        ppk = indices.NONE if shares.unresolved_matter(row) else index.ppk
+        rows.append(row | shares.with_ends("ppk", ppk) | {"needed": index.needed})
     return rows
 
 
@@ -236,31 +226,31 @@ def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
         name, study = rows[0]["load"], f"{view.store.study_name}.toml"
         level = view.load(name).limit
         limit = f"{name} > {'LEVEL' if level is None else text.value(level, view.load(name).unit)}"
-        yield Sentence(f"one in more than {view.load(name).valid.size} joints is beyond these joints")
+        number = text.several(view.load(name).valid.size, "joint")
+        yield Sentence(f"one in more than {number} is beyond these joints")
         yield Sentence(f'rarer ones: tolstat rare {study} --limit "{limit}"')
 
 
-def _ends_of_cpk(row: Row) -> str:
-    """Cell of the interval of Cpk; of too few joints its upper end."""
-    if math.isnan(row["cpk"]) and not math.isnan(row["cpk_upper"]):
-        return f"below {row['cpk_upper']:.2f}"
-    return text.ends(row["cpk_lower"], row["cpk_upper"], ".2f")
+def _ends_of_ppk(row: Row) -> str:
+    """Cell of the interval of Ppk; of too few joints its upper end."""
+    if math.isnan(row["ppk"]) and not math.isnan(row["ppk_upper"]):
+        return f"below {row['ppk_upper']:.2f}"
+    return text.ends(row["ppk_lower"], row["ppk_upper"], ".2f")
 
 
 def _notes(rows: Rows) -> Iterator[str]:
     """Definitions, unresolved joints, restrictions of the table of limits."""
-    yield "limits are upper limits: Cpk is Cpu, of median and 99.865 % quantile (ISO 22514-2), and there is no Cp"
+    yield "Ppk is Ppu: limits are upper limits. It is not Cpk: no process is shown to be under control (ISO 22514-2)"
     first = rows[0]
+    if scrap := first["scrap"]:
+        yield f"{scrap} of {first['n']} joints cannot be assembled: scrap in yield, ppm and delivery, in no Ppk"
     if unresolved := first["n_failed"] + first["n_unsettled"]:
         of = f"{unresolved} of {first['n']} joints without a valid load"
-        yield f"{of}: in the intervals of yield and ppm both ways, in no Cpk"
+        yield f"{of}: in the intervals of yield and ppm both ways, in no Ppk"
         if any(shares.unresolved_matter(row) for row in rows):
-            yield "no Cpk where joints without a valid load make a share as uncertain as sampling does"
-    if first["n"] - unresolved < LEAST_INDEX:
-        yield f"Cpk needs {LEAST_INDEX} valid joints, its lower end {first['needed']}; fewer tell at most its upper end"
-    elif any(row["cpk_lower"] == 0 for row in rows):
-        yield f"lower ends of Cpk need {first['needed']} valid joints"
-    if any(row["normal_p"] < NOT_NORMAL for row in rows):
-        yield f"'Cpk by sigma' tells no share above of a load that is not normal (p < {NOT_NORMAL:g})"
-    if all(math.isnan(row["ppm_lower"]) for row in rows):
-        yield f"{shares.NO_INTERVALS}; run replicates of other seeds"
+            yield "no Ppk where joints without a valid load make a share as uncertain as sampling does"
+    if first["n"] - unresolved - scrap < indices.LEAST:
+        words = f"Ppk needs {indices.LEAST} valid joints, its lower end {first['needed']}"
+        yield f"{words}; fewer tell at most its upper end"
+    elif any(row["ppk_lower"] == 0 for row in rows):
+        yield f"lower ends of Ppk need {first['needed']} valid joints"

@@ -128,10 +128,11 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
         parts += [Sentence(line, "lead") for line in _sentences(view, first, sides, accepted)]
         parts.append(Table("limits", "Share of the joints above each limit, before and after", LIMITS, rows))
     parts.append(Table("loads", "Largest loads, before and after", LOADS, quantiles))
-    notes = [f"{n} joints compared one by one; 95 % intervals without the numerical error, not corrected for the looks"]
+    compared = text.several(n, "joint")
+    notes = [f"{compared} compared one by one; 95 % intervals without the numerical error, not corrected for the looks"]
     notes.insert(0, changes.words(view.study, asked.text))
-    if view.method != "random" or view.store.sampling.get("joints_per_lot", 1) > 1:
-        notes.append("joints are drawn independently here: without lots, Sobol' points or a Latin hypercube")
+    if not view.design.independent:
+        notes.append("joints are drawn independently here: without lots")
     if len(view.limits) > len(loads):
         notes.append("largest loads: of each kind the one whose limit most joints exceed")
     if not facts["settled"]:
@@ -270,7 +271,7 @@ def simulate(
             found = f"{budget:g} s were over before a joint with the change was simulated"
             raise input_error("--budget", found, 'give more, such as --budget "5 min"; the same command goes on')
         if simulation.simulated:
-            work.tell(f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s")
+            work.tell(f"simulated {text.several(simulation.simulated, 'joint')} in {time.monotonic() - begin:.0f} s")
     return [path]
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import difference
+from tolstat.analysis.design import SAMPLE
 from tolstat.analysis.sample import Sample
-from tolstat.common.columns import DRAWN
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError, raise_all
 from tolstat.common.loads import ANY_LIMIT, split, unit_text
@@ -60,7 +60,7 @@ class Sides(NamedTuple):
     def has_intervals(self) -> bool:
         """Whether differences of shares have intervals."""
         designs = [view.design for view in self.views]
-        return all(design.independent if self.paired else design.has_intervals for design in designs)
+        return all(design.independent or not self.paired for design in designs)
 
     @property
     def rows(self) -> NDArray[np.intp]:
@@ -157,9 +157,8 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
     [0, 0]
     """
     for view in (a, b):
-        if view.method not in DRAWN:
-            remedy = 'compare files of studies with sampling.method "random", "sobol" or "lhs"'
-            raise inapplicable(view, "holds joints that are not drawn from tolerances", remedy)
+        if view.method != "random":
+            raise inapplicable(view, "holds joints that are not drawn from tolerances", SAMPLE)
     common, limits = _common(a, b), list(dict.fromkeys([*a.limits.items(), *b.limits.items()]))
     names, both = _names(a, b, by or (), [name for name, _ in limits]), sides(a, b)
     apart = [name for name, _ in limits if split(name)[0] not in common]
@@ -207,9 +206,7 @@ def sides(a: View, b: View) -> Sides:
     done_a, done_b = (view.status != Status.PENDING for view in (a, b))
     first = max(a.campaign_samples.start, b.campaign_samples.start)
     common = range(first, min(a.campaign_samples.stop, b.campaign_samples.stop))
-    keys = ("method", "seed", *{"sobol": ("dimensions",), "lhs": ("n",)}.get(a.method, ()))
-    same_random_numbers = all(a.store.sampling[key] == b.store.sampling[key] for key in keys)
-    if not (common and same_random_numbers):
+    if not common or a.store.sampling["seed"] != b.store.sampling["seed"]:
         return Sides((a, b), (np.flatnonzero(done_a), np.flatnonzero(done_b)), paired=False)
     samples_a, samples_b = (np.arange(len(common)) + view.campaign_samples.index(first) for view in (a, b))
     done = done_a[samples_a] & done_b[samples_b]
@@ -277,16 +274,16 @@ def _notes(
         yield f"limits left out: {', '.join(apart)}, which only one file keeps"
     a, b = map(len, both.samples)
     if both.paired:
-        yield f"{a} pairs of joints with the same random numbers"
+        yield f"{text.several(a, 'pair')} of joints with the same random numbers"
         pairs, cases = len({row["row"] for row in switched}), f"{len(switched)} such cases, limit by limit"
         yield f"{pairs} pairs have a limit that only one of their joints exceeds; {cases}"
         yield from _tests(shares)
     else:
-        yield f"{a} and {b} joints with different random numbers"
+        yield f"{a} and {text.several(b, 'joint')} with different random numbers"
     each = [Counts.of(view.status[joints]) for view, joints in zip(both.views, both.samples, strict=True)]
     if unresolved := sum(counts.failed + counts.unsettled for counts in each):
         bounds = "the bounds in JSON and CSV count them below, then above"
-        yield f"{unresolved} joints without a valid load: left out; {bounds}"
+        yield f"{text.several(unresolved, 'joint')} without a valid load: left out; {bounds}"
     if not both.has_intervals:
         yield NO_INTERVALS
 

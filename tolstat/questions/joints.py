@@ -17,6 +17,7 @@ from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of, share, word
+from tolstat.store.recorded import MISFIT
 from tolstat.store.view import View
 from tolstat.study.tolerances.correlation import correlations
 from tolstat.study.tolerances.entry import meanings
@@ -113,7 +114,9 @@ def failed(view: View) -> Answer:
         remedy = "all joints that were simulated have valid loads"
         raise inapplicable(view, "holds no failed or unsettled joints", remedy)
     counts = {status: view.count(status) for status in Status}
-    states = [{"status": s.label, "joints": n, "meaning": STATUS_TEXT[s]} for s, n in counts.items() if n]
+    scrap = {Status.OUTSIDE_MODEL: MISFIT} if view.misfits.sum() == counts[Status.OUTSIDE_MODEL] else {}
+    meaning = STATUS_TEXT | scrap
+    states = [{"status": s.label, "joints": n, "meaning": meaning[s]} for s, n in counts.items() if n]
     parts: list[Part] = [Table("states", "Number of joints by status", plain(states), states)]
     compared: Rows = []
     words = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
@@ -151,7 +154,7 @@ def tolerances(view: View) -> Answer:
         When the study cannot be read.
     """
     if not view.sampled:
-        remedy = 'give the result file of a study with [tolerances] and sampling.method "random", "sobol" or "lhs"'
+        remedy = 'give the result file of a study with [tolerances] and sampling.method = "random"'
         raise inapplicable(view, "holds joints that are no random sample", remedy)
     entries = meanings(view.study.entries).to_dict("records")
     correlated = correlations(view.study.copula, view.study.tolerances).to_dict("records")

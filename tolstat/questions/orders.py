@@ -144,7 +144,7 @@ def orders(view: View, orbits: bool = False) -> Answer:
     if bearings:
         over = "at each operating point" if any(AT in row["load"] for row in bearings) else "over the duty cycle"
         parts.append(Table("bearings", f"Equivalent loads of the shafts' bearings {over}", BEARING_COLUMNS, bearings))
-    notes = [f"{joints} joints, {facts['left_out']} without a valid load left out"]
+    notes = [f"{text.several(joints, 'joint')}, {facts['left_out']} without a valid load left out"]
     if has("q95_lower")(rows):
         notes[0] += "; 95 % intervals"
     else:

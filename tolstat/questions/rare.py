@@ -165,7 +165,7 @@ def rare(*views: View, delivery: Delivery = prediction.DELIVERY) -> Answer:
         Table("levels", f"Levels to {limit}", LEVELS, [row for rows in by_seed for row in rows], seen=by_seed[0]),
         Table("seeds", f"P({limit}) by seed", (), seeds),
         *(Sentence(line, "lead") for line in _sentences(limit, estimate, facts, seeds)),
-        *(Sentence(note) for row, view in zip(seeds, views, strict=True) for note in _notes(row, view, limit)),
+        *map(Sentence, _notes(seeds, views, limit, estimate)),
     ]
     return Answer("rare", f"Probability of {limit}", parts, facts)
 
@@ -308,15 +308,20 @@ def _sentences(limit: Limit, estimate: Estimate, facts: Row, seeds: Rows) -> Ite
     yield "this probability is that of the assumed distributions: no simulation tells whether parts have such tails"
 
 
-def _notes(row: Row, view: View, limit: Limit) -> Iterator[str]:
-    """What one seed leaves open, and what it took."""
-    if math.isnan(row["numerical_lower"]):
-        yield error_budget.command(view.path, str(limit))
-    yield f"{view.path}: {row['joints']} joints, {row['unresolved']} of them failed or not settled"
-    if row["reached"]:
-        yield f"the estimate is as precise as that from {row['as_sure_as']:.2g} random joints"
-    if row["unresolved_first"] and row["counted"] == "below":
+def _notes(seeds: Rows, views: Sequence[View], limit: Limit, estimate: Estimate) -> Iterator[str]:
+    """What the seeds leave open, and what they took: each note once."""
+    unknown = [view.path for row, view in zip(seeds, views, strict=True) if math.isnan(row["numerical_lower"])]
+    if unknown:
+        others = f", and with each of the other {len(unknown) - 1} files" if len(unknown) > 1 else ""
+        yield error_budget.command(unknown[0], str(limit)) + others
+    for row, view in zip(seeds, views, strict=True):
+        yield f"{view.path}: {text.several(row['joints'], 'joint')}, {row['unresolved']} of them failed or not settled"
+    p, deviation = estimate.probability, estimate.deviation
+    if deviation > 0.0 and all(row["reached"] for row in seeds):
+        yield f"the estimate is as precise as that from {(1.0 - p) / (p * deviation**2):.2g} random joints"
+    open_ = [row["upper_if_above"] for row in seeds if row["unresolved_first"] and row["counted"] == "below"]
+    if open_:
         yield (
             "joints without a valid load count as below the level; if all of them were above, P would be at most "
-            f"{row['upper_if_above']:.2g} (--unresolved above counts them as above)"
+            f"{max(open_):.2g} (--unresolved above counts them as above)"
         )

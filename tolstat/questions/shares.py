@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.study import Study
-from tolstat.study.placing import joint_beside, placed
+from tolstat.study.placing import joints_beside, placed
 from tolstat.study.points import at
 from tolstat.study.rewriting import with_keys
 
@@ -47,7 +47,7 @@ ORIGIN = {
 }
 """Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
-JOINT_FILE = "_joint.toml"
+JOINT_FILES = {"joint": "_joint.toml", "joint2": "_joint2.toml"}
 """End of the name of a joint file that is written beside a study."""
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
@@ -67,11 +67,6 @@ def share(key: str) -> Cell:
 def shares(lower: str, upper: str) -> Cell:
     """Make a `Column.cell` of an interval of shares, in per cent."""
     return lambda row: text.span(row[lower], row[upper])
-
-
-def between(key: str) -> Cell:
-    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, in per cent without the unit."""
-    return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
 
 
 def value(key: str) -> Cell:
@@ -102,7 +97,8 @@ def estimated(
 
 def above(row: Row) -> str:
     """Cell of the joints above a limit, and of how many with a valid load."""
-    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+    scrap = row.get("scrap", 0)
+    return f"{row['count'] - scrap} of {row['n'] - row['n_failed'] - row['n_unsettled'] - scrap}"
 
 
 def limit(row: Row) -> str:
@@ -131,14 +127,19 @@ def unusable(view: View, reason: str, remedy: str) -> StoreError:
 
 
 def study_documents(study: Study, changed: str) -> list[Document]:
-    """Study of a changed text, and the file of its joint where that has to be written, as they run where they lie."""
-    joint = joint_beside(study)
+    """Study of a changed text, and files of its joints where these have to be written, as they run where they lie."""
+    joints = {path: (JOINT_FILES[str(path[-1])], text) for path, text in joints_beside(study).items()}
 
     def of(path: Path) -> str:
-        here, base = placed(changed, study.path, path), {"base": f"{path.stem}{JOINT_FILE}"}
-        return with_keys(here, {("joint",): base}, path.name) if joint else here
+        here = placed(changed, study.path, path)
+        bases = {at: {"base": f"{path.stem}{end}"} for at, (end, _) in joints.items()}
+        return with_keys(here, bases, path.name) if bases else here
 
-    return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
+    return [Document(".toml", of), *(Document(end, partial(_given, text)) for end, text in joints.values())]
+
+
+def _given(text: str, _: Path) -> str:
+    return text
 
 
 def check_sample(view: View) -> None:
@@ -172,16 +173,19 @@ def grouped(reasons: Iterable[tuple[str, str]]) -> str:
 
 
 def good(view: View, name: str = ANY_LIMIT, delivery: int = DELIVERY) -> Mapping[str, Any]:
-    """Yield, joints above in a million and in the next delivery: the keys of `capability.limit_rows` but indices."""
+    """Yield, joints above, or scrap, in a million and in a delivery: keys of `capability.limit_rows` but indices."""
     return view.kept(("good", name, delivery), lambda: _good(view, name, delivery))
 
 
 def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
-    loads, above = error_budget.with_error(view, load), load.above(load.limit)
+    loads, scrap = error_budget.with_error(view, load), view.misfits
+    loads = tuple(each.with_scrap(scrap) for each in loads) if scrap.any() else loads
+    above = loads[0].above(load.limit)
     row: dict[str, Any] = {"load": load.name, "unit": load.unit, "limit": load.limit}
     row |= {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+    row |= {"scrap": int(scrap.sum())}
     share, low, high = above.estimate, *total_interval(loads, load.limit, CONFIDENCE)
     row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
     row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
@@ -214,6 +218,7 @@ def together(row: Row, limits: int) -> Yield:
     if kind == "bounds":
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
     span, counted = text.span(low, high), f"{valid - above} of {valid}{' with a valid load' if unresolved else ''}"
+    counted += f", {row['scrap']} cannot be assembled" if row["scrap"] else ""
     figure = text.percent(row["good"])
     if unresolved_matter(row):
         figure, interval = span, kind

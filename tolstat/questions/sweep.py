@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.campaign.remedy import remedy
 from tolstat.common.columns import holds
+from tolstat.common.error_fields import error_units
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray, LoadPanel, load_of, load_panels, names_of, panels, unit_text
 from tolstat.common.mechanism import Mechanism
@@ -26,7 +27,6 @@ from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
 from tolstat.study.design import KEYS
-from tolstat.study.selection import error_units
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""

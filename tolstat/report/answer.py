@@ -148,8 +148,8 @@ def stopped(view: View) -> str:
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
         f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
-        f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
-        "intervals of this report are not corrected for the stop"
+        f"{stop['upper']:.5f}; share {stop['estimate']:.5f}, {BIASED}. All intervals of shares and quantiles of this "
+        "file are valid after any number of looks"
     )
 
 

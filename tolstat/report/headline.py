@@ -9,9 +9,10 @@ from functools import partial
 import numpy as np
 
 from tolstat.analysis import binomial
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
-from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
+from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID, Status
 from tolstat.display import table, text
 from tolstat.display.verdict import WORDS, Verdict, deciding
 from tolstat.questions import joints, shares
@@ -21,6 +22,7 @@ from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.fatigue import answer as fatigue
+from tolstat.store.recorded import MISFIT
 from tolstat.store.view import View
 
 
@@ -56,14 +58,14 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
 
-def _deciding(row: table.Row, accepted: float) -> str:
-    """Words on the number of simulated joints whose interval excludes the accepted share, those without a load too."""
+def _deciding(row: table.Row, accepted: float, level: float = CONFIDENCE) -> str:
+    """Words on the number of simulated joints that decide, those without a load too."""
     low, high = row["bound_lower"], row["bound_upper"]
     if not np.isnan(row["numerical_lower"]):
         part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
-    return deciding((low, high), accepted, lambda end: binomial.needed(end, accepted))
+    return deciding((low, high), accepted, row["n"], lambda share: binomial.needed(share, accepted, level))
 
 
 def _judged(view: View, records: Sequence[table.Row], accepted: float, standing: Standing | None) -> Verdict:
@@ -76,7 +78,8 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
         return Verdict(answer, WORDS[answer], _reason(view, [row]), notes)
     value, words = _sentence(view, row, accepted, answer, standing)
     if first := _without_errors(view):
-        words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
+        is_first = answer != "yes" and value == WORDS[answer]  # a verdict that holds begins with what holds
+        words = f"{first}. {text.capital(words)}" if is_first else f"{words}. {text.capital(first)}"
     if several and worst["count"]:
         alike = sum(record["estimate"] == worst["estimate"] for record in records) - 1
         others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
@@ -100,7 +103,7 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
         words = f"at most {most} exceed {limit} ({share}, {interval}){behind}"
     else:
         if answer == "open" and view.design.independent:
-            words += f"; {_deciding(row, accepted)}"
+            words += f"; {_deciding(row, accepted, view.design.level(CONFIDENCE))}"
         words += f". {behind}" if behind else ""
     missing = sentences.not_varied(standing, view.path.name)
     return value, words + (f"; {missing}" if missing else "")
@@ -138,15 +141,13 @@ def _limit(view: View, row: table.Row) -> str:
 
 def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) -> Verdict:
     """Without an accepted share: share of the joints that keep all limits."""
-    without = view.design.without_interval("share")
-    notes: tuple[str, ...] = (without,) if without else ()
     in_words = shares.together(shares.good(view), len(view.limits))
     if not in_words.decides:
-        return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
+        return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), ())
     behind = [sentences.of_variations(standing, ""), text.capital(_without_errors(view))]
     missing = sentences.not_varied(standing, view.path.name)
     words = ". ".join([in_words.words + (f"; {missing}" if missing else ""), *filter(None, behind)])
-    return Verdict("", in_words.value, words, notes, exceedance.most_exceeded(view, records)["load"])
+    return Verdict("", in_words.value, words, (), exceedance.most_exceeded(view, records)["load"])
 
 
 def _reason(view: View, records: Sequence[table.Row]) -> str:
@@ -155,24 +156,28 @@ def _reason(view: View, records: Sequence[table.Row]) -> str:
     n = max(row["n"] for row in records)
     if any(map(shares.unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
-        return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if without := view.design.without_interval("share"):
-        return without
+        why = f": {MISFIT}" if view.misfits.sum() == lost else ""
+        return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n}{why})"
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 
 def _causes(view: View) -> Iterator[str]:
     """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
     state = max((*FAILED, *UNSETTLED), key=view.count)
-    if view.count(state):
-        words = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
+    if number := view.count(state):
+        scrap = state == Status.OUTSIDE_MODEL and view.misfits.sum() == number
+        words = f"{number} of {view.n}: {MISFIT}" if scrap else f"{number} {state.label}: {STATUS_TEXT[state]}"
         first = next((joint for joint in joints.without_load(view) if joint["status"] == state.label), None)
         yield f"{words}. Row {first['row']}: {first['remedy']}" if first else words
 
 
 def _pending(view: View) -> tuple[str, ...]:
     pending = view.counts.total - view.counts.done
-    return (f"{pending} of {view.counts.total} joints are still pending",) if pending else ()
+    return (
+        (f"{pending} of {text.several(view.counts.total, 'joint')} {'is' if pending == 1 else 'are'} still pending",)
+        if pending
+        else ()
+    )
 
 
 SAMPLES = 1000

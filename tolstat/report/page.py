@@ -219,18 +219,23 @@ def joint_values(store: Reader) -> Listing:
     InputError
         When this version cannot read the joint in the file.
     """
-    joint = strict.validate(Joint, store.joint, f"{store.path}: joint")
-    given_keys, values = leaves(joint.given()), _values(joint)
-    default = _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
-    rows = [
-        (key, value, default.get(key, "-"), "given" if key in given_keys else derived.DERIVED[key].formula)
-        for key, value in values.items()
-        if value != default.get(key) and (key in given_keys or key in derived.DERIVED)
-    ]
+    joint, joint2 = strict.validate(Joint, store.joint, f"{store.path}: joint"), recorded.joint2_of(store)
+    rows = _different("joint1." if joint2 else "", joint)
+    rows += _different("joint2.", joint2) if joint2 else []
     title = f"The joint: values that differ from {DEFAULT_JOINT}"
     if not rows:
         return Listing(title, f"none: it is {DEFAULT_JOINT}")
     return Listing(title, text.align([("key", "value", DEFAULT_JOINT, "by"), *rows], [True, False, False, True]))
+
+
+def _different(prefix: str, joint: Joint) -> list[tuple[str, str, str, str]]:
+    """Values of a joint that differ from those of `DEFAULT_JOINT`: key behind a prefix, value, default, formula."""
+    given_keys, default = leaves(joint.given()), _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
+    return [
+        (f"{prefix}{key}", value, default.get(key, "-"), "given" if key in given_keys else derived.DERIVED[key].formula)
+        for key, value in _values(joint).items()
+        if value != default.get(key) and (key in given_keys or key in derived.DERIVED)
+    ]
 
 
 def _values(joint: Joint) -> dict[str, str]:
@@ -315,6 +320,7 @@ def _cards(view: View, verdict: Verdict | None) -> list[Verdict]:
             cards.append(Verdict("", together.value, together.words, ("Yield",)))
         if (interval := text.ends(row["next_lower"], row["next_upper"], ".0f")) != "-":
             exceeded = "at least one limit" if len(view.limits) > 1 else "the limit"
+            exceeded += " or cannot be assembled" if row["scrap"] else ""
             predicted = f"of the next {row['delivery']} joints{view.design.of_delivery} exceed {exceeded}"
             cards.append(Verdict("", interval, predicted, ("95 % prediction interval",)))
     if verdict is not None and verdict.load and verdict.load not in verdict.words:

@@ -14,6 +14,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import VALID
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Sentence, Table
+from tolstat.joint import joints_of
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import HOUR, places_of, rated, turning_of
 from tolstat.store.view import View
@@ -104,11 +105,12 @@ def parts(
 
 def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Rating life of each of `places_of`, h, (n,) each; none without what they need."""
-    bearing = study.joint.bearing
-    if bearing is None or bearing.lacking(FOR_LIFE):
+    bearings = [joint.bearing for joint in joints_of(study.joint, study.operation)]
+    complete = [bearing for bearing in bearings if bearing is not None and not bearing.lacking(FOR_LIFE)]
+    if len(complete) < len(bearings):
         return {}
-    names = [f"life of {bearings}" for bearings in places_of(study.mechanism).values()]
-    return dict(zip(names, rated(bearing, np.ones(1), [turning])[1].T, strict=True))
+    names = [f"life of {place}" for place in places_of(study.mechanism).values()]
+    return dict(zip(names, rated(complete, np.ones(1), [turning])[1].T, strict=True))
 
 
 def _verdict(names: Mapping[str, Sequence[str]], lacking: Sequence[str]) -> str:

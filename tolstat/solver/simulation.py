@@ -205,7 +205,7 @@ def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> 
 def lanes_for(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width(), mechanism)
-    batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
+    batch.par.n_stations[:], batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
     return batch
 
 
@@ -278,8 +278,8 @@ def hitting(params: NDArray[np.void], options: Options, mechanism: Mechanism = C
 
 def _groups(params: NDArray[np.void], among: NDArray[np.bool_], max_size: int) -> Iterator[NDArray[np.intp]]:
     """Yield the indices of joints with equal numbers of contact stations and orders, at most `max_size` at a time."""
-    shared = params[["n_stations", "n_orders"]]
-    for counts in np.unique(shared[among]):
-        rows = np.flatnonzero(among & (shared == counts))
+    shared = np.column_stack([params["n_stations"], params["n_orders"]])
+    for counts in np.unique(shared[among], axis=0):
+        rows = np.flatnonzero(among & (shared == counts).all(axis=1))
         for first in range(0, len(rows), max_size):
             yield rows[first : first + max_size]

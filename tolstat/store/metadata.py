@@ -118,7 +118,6 @@ def of_study(
     study: Study,
     rows: range,
     histories: Mapping[str, HistorySpec],
-    dimensions: Mapping[str, int],
     options: Options | None = None,
     fidelity: Mapping[str, Any] | None = None,
 ) -> Metadata:
@@ -132,8 +131,6 @@ def of_study(
         Rows of the campaign that the file holds.
     histories : mapping of str to HistorySpec
         Histories that the campaign keeps.
-    dimensions : mapping of str to int
-        Dimension of the sampling sequence that each error is drawn from.
     options, fidelity : Options and mapping, optional
         Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
     """
@@ -143,7 +140,7 @@ def of_study(
         identity=study.identity(),
         options=to_names(options or study.solver.options()),
         fidelity=dict(fidelity or {}),
-        sampling=study.sampling.model_dump(mode="json") | {"dimensions": dict(dimensions)},
+        sampling=study.sampling.model_dump(mode="json"),
         versions=versions(),
         design=Design(cases=tuple(study.case_names), variants=tuple(study.variants)),
         histories=dict(histories),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent, Listed, Replicated
+from tolstat.analysis.design import Design, Independent, Listed, Looked
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import Options, from_names, tables
@@ -20,9 +20,9 @@ from tolstat.joint.derived import get
 from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID, mounting_and_law
 from tolstat.solver import fidelity
-from tolstat.store.hdf5 import pick, store_error
+from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
-from tolstat.study import Study, load, points, subset_of
+from tolstat.study import Study, load, mounting, subset_of
 from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
 
@@ -46,6 +46,17 @@ def joint_of(store: Reader, row: int) -> Joint:
     return varied(nominal, _values(store, row))
 
 
+def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:
+    """Joints that are simulated together in file slot `row`: one, or both of a drive shaft."""
+    joint = joint_of(store, row)
+    return (joint, joint2_of(store) or joint) if store.mechanism.is_shaft else (joint,)
+
+
+def joint2_of(store: Reader) -> Joint | None:
+    """Joint 2 of drive shafts, the same at all operating points, if it is another than joint 1."""
+    return next((point.operation.joint2 for point in store.points.values()), None)
+
+
 def operation_of(store: Reader, row: int) -> Operation:
     """Operating point of file slot `row`: that of the store, or of the slot's variant; see `joint.operating`."""
     values = {key.removeprefix("operation."): value for key, value in _values(store, row).items() if key in _OPERATION}
@@ -58,7 +69,7 @@ def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDA
     errors = store.errors(slots, (*_OPERATION, SPLINE) if sticks else _OPERATION)
 
     def at(row: int, errors: NDArray[np.void]) -> dict[str, NDArray[np.float64]]:
-        return operating(operation_of(store, row), errors, joint_of(store, row).shaft.spline if sticks else None)
+        return operating(operation_of(store, row), errors, joints_at(store, row)[-1].shaft.spline if sticks else None)
 
     if not store.variants:
         return at(0, errors)
@@ -128,16 +139,18 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
     numbers = np.unique(store.design()["variant"]) if store.variants else ()
     changed = [store.variants[number].values for number in numbers] or [{}]
-    axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed]
-    return axial, [values.get("contact.law", nominal.contact.law) for values in changed]
+    laws = [values.get("contact.law", nominal.contact.law) for values in changed]
+    if joint2 := joint2_of(store):
+        return [joint2.shaft.axial], [*laws, joint2.contact.law]
+    return [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed], laws
 
 
 def note_on_mounting(store: Reader) -> str:
-    """Note where rigid shafts meet errors along them, see `points.note_on_shafts`; empty for other files."""
+    """Note where rigid shafts meet errors along them, see `mounting.note_on_shafts`; empty for other files."""
     names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
     joint, name = joint_of(store, 0), store.study_name
-    command = points.with_free_shaft(f"{name}.toml", name, joint)
-    return points.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
+    command = mounting.with_free_shaft(f"{name}.toml", name, joint)
+    return mounting.note_on_shafts(names, mountings(store)[0], store.mechanism, command)
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
@@ -149,6 +162,17 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
         first = int(rows[here][0])
         params[here] = perturb(joint_of(store, first), operation_of(store, first), errors[here])
     return params
+
+
+MISFIT = "a pin is larger than its hole"
+"""Why a joint of `misfits` has no result."""
+
+
+def misfits(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Which of the joints in file slots `rows`, ascending, cannot be assembled, (m,): see `MISFIT`."""
+    parts = (rows[first : first + BLOCK] for first in range(0, len(rows), BLOCK))
+    none = np.zeros(0, dtype=bool)
+    return np.concatenate([none, *((parameters(store, part)["clearance"] < 0.0).any(axis=1) for part in parts)])
 
 
 def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) -> NDArray[np.void]:
@@ -203,8 +227,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
+    joint2 = None if path is not None else joint2_of(store)
     try:
-        study = load(source, n=joints, text=text, joint=joint)
+        study = load(source, n=joints, text=text, joint=joint, joint2=joint2)
     except InputError as error:
         if path is not None:
             raise
@@ -212,7 +237,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         remedy = "give the study file, if the command has this option: --study STUDY"
         raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
-        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+        study = subset_of(study, store.sampling)
     study = _at_point(store, study)
     differing = differing_keys(store.identity, study.identity())
     if differing:
@@ -220,7 +245,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise store_error(store.path, found, "give the study file of the campaign: --study STUDY")
     if n is None:
         return study
-    return _at_point(store, load(source, n=n, text=text, joint=joint))
+    return _at_point(store, load(source, n=n, text=text, joint=joint, joint2=joint2))
 
 
 def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
@@ -256,20 +281,11 @@ def differing_keys(in_file: Mapping[str, Any], wanted: Mapping[str, Any]) -> lis
     return lines
 
 
-def design_of(store: Reader, unfinished: bool) -> Design:
-    """Sampling design of a file: the first that recognises how its joints were drawn.
-
-    Parameters
-    ----------
-    store : Reader
-        The file.
-    unfinished : bool
-        Whether joints are pending; replicates are then unequal, and do not count as such.
-    """
-    sampling, skip = store.sampling, store.first_sample
-    method, n = str(sampling["method"]), store.n - skip
-    if sampling.get("joints_per_lot", 1) > 1:
-        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
-    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
-        return Replicated(n, int(sampling["replicates"]), method)
-    return Independent() if method == "random" else Listed(method)
+def design_of(store: Reader) -> Design:
+    """Sampling design of a file: how its joints were drawn."""
+    method, size = str(store.sampling["method"]), int(store.sampling.get("joints_per_lot", 1))
+    if size > 1:
+        return Clustered(np.asarray(store.samples) // size)
+    if method != "random":
+        return Listed(method)
+    return Looked() if store.stop else Independent()

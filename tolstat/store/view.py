@@ -25,7 +25,7 @@ from tolstat.common.tables import Status, tables
 from tolstat.store import verification, what_if, worst
 from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
-from tolstat.store.recorded import design_of, recall
+from tolstat.store.recorded import design_of, misfits, recall
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
 from tolstat.study import Study
@@ -310,7 +310,7 @@ class View:
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
-        return design_of(self.store, bool(self.count(Status.PENDING)))
+        return design_of(self.store)
 
     @property
     def sampled(self) -> bool:
@@ -332,6 +332,13 @@ class View:
     def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
         """Rows of the campaign of samples."""
         return self.store.row(self.slots(samples))
+
+    @cached_property
+    def misfits(self) -> NDArray[np.bool_]:
+        """Which joints have no result since they cannot be assembled, (n,)."""
+        outside = self.status == Status.OUTSIDE_MODEL
+        outside[outside] = misfits(self.parts[0].store, self.slots(np.flatnonzero(outside)))
+        return frozen(outside)
 
     def slots(self, samples: ArrayLike) -> NDArray[np.intp]:
         """File slots of samples."""
@@ -382,7 +389,7 @@ class View:
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
         pending = self.counts.total - self.counts.done
-        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
+        text = f"{self.counts.done} joint{'s' * (self.counts.done != 1)} ({METHODS.get(self.method, self.method)})"
         if all(self.points):
             *others, last = self.points
             text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"

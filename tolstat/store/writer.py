@@ -46,7 +46,6 @@ class Writer(Reader):
         study: Study,
         errors: Iterable[NDArray[np.void]],
         histories: Mapping[str, HistorySpec] | None = None,
-        dimensions: Mapping[str, int] | None = None,
         rows: range | None = None,
         options: Options | None = None,
         fidelity: Mapping[str, Any] | None = None,
@@ -64,8 +63,6 @@ class Writer(Reader):
             Errors of every joint of the file, in consecutive blocks of rows.
         histories : mapping of str to HistorySpec, optional
             Load histories to keep.
-        dimensions : mapping of str to int, optional
-            Dimension of the sampling sequence that each error is drawn from.
         rows : range, optional
             Rows of the campaign that the file holds; all without it.
         options, fidelity : Options and mapping, optional
@@ -79,7 +76,7 @@ class Writer(Reader):
             When the file exists or cannot be written.
         """
         rows = range(study.rows) if rows is None else rows
-        document = metadata.of_study(study, rows, histories or {}, dimensions or {}, options, fidelity)
+        document = metadata.of_study(study, rows, histories or {}, options, fidelity)
         tables = {"errors": errors}
         if study.variants:
             tables["design"] = [study.design[rows.start : rows.stop]]

@@ -10,14 +10,17 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
+from tolstat.common.error_fields import error_units
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.joint import derived
+from tolstat.joint.contact import Contact
 from tolstat.joint.derived import get
 from tolstat.joint.model import leaves, merged, nested
+from tolstat.joint.operation import having
 from tolstat.joint.reading import with_keys
 from tolstat.study.measured import left_open, of_entries
-from tolstat.study.selection import error_units, excludes
+from tolstat.study.selection import excludes
 from tolstat.study.study import Study
 from tolstat.study.tolerances.zones import short_axes
 
@@ -225,26 +228,47 @@ ROUNDING = 1e-9
 
 
 def warnings(study: Study) -> Iterator[Fault]:
-    """Warnings about a study: short common axes, errors far wider than the clearance, speeds far too high."""
-    yield from (study.fault(*warning) for warning in short_axes(study.entries, study.joint.contact.z))
+    """Warnings about a study: short axes, errors far wider than the clearance, speeds far too high, idle shafts."""
+    yield from (study.fault(*warning) for warning in short_axes(study.entries, lambda name: _contact(study, name).z))
     yield from _wide_bands(study)
     yield from _fast_points(study)
+    if study.operation.joint2 is not None:
+        yield from _idle_ends(study)
+
+
+def _idle_ends(study: Study) -> Iterator[Fault]:
+    """Keys of a study for an outer shaft that is the other joint's."""
+    data = leaves(tomllib.loads(study.text))
+    for key, end, section, owner in (
+        ("output", "output", "joint", "shaft.joint2"),
+        ("unbalance", "output", "joint", "shaft.joint2"),
+        ("input", "input", "shaft.joint2", "joint"),
+    ):
+        if any(name.startswith(f"{section}.shaft.{key}.") for name in data):
+            found, remedy = f"has no effect: the {end} shaft is that of [{owner}]", f"write it as {owner}.shaft.{key}"
+            yield study.fault(f"{section}.shaft.{key}", found, remedy)
+
+
+def _contact(study: Study, name: str) -> Contact:
+    """Contact of the joint that a name is about."""
+    return having(name, study.joint, study.operation.joint2).contact
 
 
 def _wide_bands(study: Study) -> Iterator[Fault]:
     """Entries whose positions and angles across a pin leave no room for it in its hole."""
-    contact = study.joint.contact
     for entry in study.entries:
-        sizes = []
+        sizes = [(0.0, 0.0, 0.0)]
         for site, model in entry.models:
+            contact = _contact(study, site.name)
             for meaning in model.meaning(site):
                 keys = {name.rpartition(".")[2] for name in meaning.errors}
-                across = meaning.sigma if keys & {"offset_t", "offset_z"} else 0.0
-                sizes.append(0.5 * contact.z * meaning.sigma if keys & {"tilt_t", "tilt_z"} else across)
-        ratio = max(sizes, default=0.0) / max(contact.clearance, LEAST_CLEARANCE)
+                size = meaning.sigma if keys & {"offset_t", "offset_z"} else 0.0
+                size = 0.5 * contact.z * meaning.sigma if keys & {"tilt_t", "tilt_z"} else size
+                sizes.append((size / max(contact.clearance, LEAST_CLEARANCE), size, contact.clearance))
+        ratio, size, clearance = max(sizes)
         if ratio > WIDE:
-            room = units.shown(contact.clearance, "m")
-            found = f"moves the end of a pin by {units.shown(max(sizes), 'm')} (standard deviation), {ratio:.0f} times "
+            room = units.shown(clearance, "m")
+            found = f"moves the end of a pin by {units.shown(size, 'm')} (standard deviation), {ratio:.0f} times "
             found += f"the radial clearance of {room}: nearly every pin binds"
             remedy = "check its unit, and contact.clearance of the joint"
             yield study.fault(f"tolerances.{entry.pattern}", found, remedy)

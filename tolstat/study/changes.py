@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -16,7 +16,7 @@ from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
-from tolstat.joint import varied
+from tolstat.joint import Joint, varied
 from tolstat.joint.derived import replaced
 from tolstat.joint.model import leaves, merged
 from tolstat.joint.reading import with_keys
@@ -37,6 +37,8 @@ DIGITS = 10
 """Significant digits of numbers that are compared: conversions of units agree in more."""
 NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
 """A number in JSON, or in a text there that is a quantity."""
+JOINT, JOINT2 = ("joint",), ("shaft", "joint2")
+"""Key paths of the joints."""
 NAMES = 2
 """Number of parts of a key of an operating point or fit, and of the name of an error of one joint: ``pin1.tilt_t``."""
 
@@ -88,29 +90,40 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
                 else:
                     entries.set(path, value, place)
         with gather(faults):
-            text = _without_replaced(study, text, places)
+            for joint in (JOINT, JOINT2):
+                text = _without_replaced(study, text, places, joint)
     return entries.written(text)
 
 
-def _without_replaced(study: Study, text: str, paths: Iterable[tuple[str, ...]]) -> str:
-    """Text without the keys of the joint that give way to those set: the third of a bearing, the other section."""
-    old, new = (leaves(tomllib.loads(each)["joint"]) for each in (study.text, text))
-    changed = {key for key, value in new.items() if old.get(key) != value}
-    given = changed | {".".join(path[1:]) for path in paths if path[0] == "joint"}
+def _without_replaced(study: Study, text: str, paths: Collection[tuple[str, ...]], joint: tuple[str, ...]) -> str:
+    """Text without the keys of a joint that give way to those set: the third of a bearing, the other section.
+
+    `joint`: its key path.
+    """
+    old, new = (leaves(_table(each, joint)) for each in (study.text, text))
+    dotted, changed = ".".join(joint), {key for key, value in new.items() if old.get(key) != value}
+    given = changed | {".".join(path[len(joint) :]) for path in paths if path[: len(joint)] == joint}
     away = replaced(given, old)
     if lost := sorted(old.keys() - new.keys() - away):
         found = f"leaves out {', '.join(lost)}, which the study sets"
-        raise input_error("--set joint", found, "set each key by itself: --set joint.contact.law=sliced")
+        raise input_error(f"--set {dotted}", found, f"set each key by itself: --set {dotted}.contact.law=sliced")
     for key in away & new.keys():
         *tables, name = key.split(".")
-        text = rewriting.with_keys(text, {("joint", *tables): {name: None}}, f"--set joint.{key}")
+        text = rewriting.with_keys(text, {(*joint, *tables): {name: None}}, f"--set {dotted}.{key}")
     return text
 
 
-def keys_of_joint(text: str, study: Study) -> dict[str, Any]:
-    """Dotted keys of ``[joint]`` of a text that differ from those of the study's, and their values."""
-    old, new = (leaves(tomllib.loads(each)["joint"]) for each in (study.text, text))
+def _keys_of_joint(text: str, study: Study, path: Sequence[str]) -> dict[str, Any]:
+    """Dotted keys of the joint at a key path of a text that differ from those of the study's, and their values."""
+    old, new = (leaves(_table(each, path)) for each in (study.text, text))
     return {key: value for key, value in new.items() if old.get(key) != value}
+
+
+def _table(text: str, path: Sequence[str]) -> Mapping[str, Any]:
+    table: Any = tomllib.loads(text)
+    for key in path:
+        table = table.get(key, {}) if isinstance(table, Mapping) else {}
+    return table if isinstance(table, Mapping) else {}
 
 
 def words(study: Study, text: str) -> str:
@@ -158,24 +171,32 @@ def read(study: Study, text: str) -> Study:
         raise InputError([Fault(place, f.found, f.remedy) for place, f in pairs]) from error
 
 
-def _read(study: Study, text: str) -> Study:
-    joint, keys = study.joint, keys_of_joint(text, study)
+def _changed(study: Study, text: str, joint: Joint, path: Sequence[str]) -> Joint:
+    """Joint at a key path of a changed text: `joint` with the keys that the text changes."""
+    keys, name = _keys_of_joint(text, study, path), ".".join(path)
     if "base" in keys:
-        raise input_error("--set joint.base", "is another joint", "run a study of its own, and compare both files")
+        raise input_error(f"--set {name}.base", "is another joint", "run a study of its own, and compare both files")
     by_fit = [f"contact.{key}" for key in (*study.fit.diameters, "clearance")] if study.fit is not None else []
     still = study.fit is not None and fits.KEY in tomllib.loads(text)["tolerances"]
     if still and (twice := [key for key in by_fit if key in keys]):
-        raise InputError([Fault(f"--set joint.{key}", *BESIDE_FIT) for key in twice])
-    if keys and not keys.keys() <= set(by_fit):
-        over = {key: value for key, value in tomllib.loads(text)["joint"].items() if key != "base"}
-        over = merged(over, {"contact": study.fit.diameters}) if still and study.fit is not None else over
-        joint = with_keys(joint.given("json"), {}, over, f"{study.path}: joint")
-    changed = load(study.path, study.sampling.n, text, joint)
+        raise InputError([Fault(f"--set {name}.{key}", *BESIDE_FIT) for key in twice])
+    if not keys or keys.keys() <= set(by_fit):
+        return joint
+    over = {key: value for key, value in _table(text, path).items() if key != "base"}
+    over = merged(over, {"contact": study.fit.diameters}) if still and study.fit is not None else over
+    return with_keys(joint.given("json"), {}, over, f"{study.path}: {name}")
+
+
+def _read(study: Study, text: str) -> Study:
+    joint2 = study.operation.joint2
+    joints = [_changed(study, text, study.joint, JOINT)]
+    joints += [_changed(study, text, joint2, JOINT2)] if joint2 else []
+    changed = load(study.path, study.sampling.n, text, *joints)
     if changed.fit is not None and (study.fit is None or changed.fit.diameters != study.fit.diameters):
         diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in changed.fit.diameters.items()}
-        changed = load(study.path, study.sampling.n, text, varied(joint, diameters))
+        changed = load(study.path, study.sampling.n, text, *(varied(joint, diameters) for joint in joints))
     if len(changed.points) > len(study.points):  # the campaign is at one of several points
-        every = load(study.path, study.sampling.n, study.text, study.joint).points
+        every = load(study.path, study.sampling.n, study.text, study.joint, joint2).points
         number = [point.operation for point in every].index(study.operation)
         changed = changed.at(changed.points[number].name)
     return changed

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.common.columns import result_columns
+from tolstat.common.error_fields import error_units, given_units
 from tolstat.common.loads import FloatArray
 from tolstat.common.mechanism import Mechanism, features
 from tolstat.common.text_table import TextTable, number
 from tolstat.study.axes import columns_of, zone_units
-from tolstat.study.selection import error_units, excludes, given_units, halves, select, suggestion
+from tolstat.study.selection import excludes, halves, select, suggestion
 
 _PART = re.compile(r"(?:.*\.)?(?:pin|hole)\d+")
 """Names of pins and holes, of which there may be others."""

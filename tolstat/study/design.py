@@ -75,20 +75,13 @@ class Design:
         }
 
 
-def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:
-    """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
-    engine = stats.qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
-    # SciPy expects a power of two when it draws from the start of the sequence
-    start = engine.fast_forward(first).random(n) if first else engine.random_base2(max(n - 1, 0).bit_length())
-    points: NDArray[np.float64] = start[:n]
-    return points + 2.0 ** -(SOBOL_BITS + 1)
-
-
 def cube(design: str, n: int, dimensions: int, seed: int) -> list[list[float]]:
     """Points of a family in the unit cube, n lists of `dimensions`: its diagonal (``line``) or a Sobol' sequence."""
-    if design == "sobol":
-        return [[float(share) for share in point] for point in sobol(n, dimensions, seed)]
-    return [[number / (n - 1)] * dimensions for number in range(n)]
+    if design == "line":
+        return [[number / (n - 1)] * dimensions for number in range(n)]
+    engine = stats.qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
+    points = engine.random_base2((n - 1).bit_length())[:n] + 2.0 ** -(SOBOL_BITS + 1)  # the middle of their cells
+    return [[float(share) for share in point] for point in points]
 
 
 KEYS = {key: unit for key, unit in quantities(Joint).items() if affects_results(key)}

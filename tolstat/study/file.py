@@ -52,19 +52,45 @@ def _joint(file: Reading) -> Joint | None:
     if keys.get("base") is None:
         file.fault("joint.base", "missing key", 'add base, for example base = "cirelli2021"')
         return None
+    return _loaded(file, keys, "joint")
+
+
+def _joint2(file: Reading) -> Joint | None:
+    """``[shaft.joint2]``: joint 2 of a drive shaft as ``[joint]`` is joint 1; None where both are the same."""
+    keys = file.table("shaft").get("joint2")
+    if keys is None:
+        return None
+    if not isinstance(keys, Mapping) or keys.get("base") is None:
+        found = "missing key" if isinstance(keys, Mapping) else f"{keys!r} is not a table"
+        file.fault("shaft.joint2.base", found, 'write [shaft.joint2] with base = "mine.toml", the file of joint 2')
+        return None
+    return _loaded(file, keys, "shaft.joint2")
+
+
+def _loaded(file: Reading, keys: Mapping[str, Any], section: str) -> Joint:
+    """Joint of a section with a `base`."""
     if file.fit is not None and isinstance(keys["base"], str):
-        keys = _with_diameters(file, keys)
-    return reading.load(keys["base"], keys, file.place, file.folder)
+        keys = _with_diameters(file, keys, section)
+    return reading.load(keys["base"], keys, file.place, file.folder, section)
 
 
-def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of the joint with the fit's diameters; note diameters and clearance that the study sets beside it."""
+def _shaft(file: Reading) -> DriveShaft | None:
+    """``[shaft]``, with `_joint2`."""
+    keys = file.table("shaft")
+    if "shaft" not in file.data:
+        return None
+    shaft = file.model(DriveShaft, {key: value for key, value in keys.items() if key != "joint2"}, "shaft")
+    return shaft.model_copy(update={"joint2": file.joint2})
+
+
+def _with_diameters(file: Reading, keys: Mapping[str, Any], section: str) -> dict[str, Any]:
+    """Keys of a joint with the fit's diameters; note diameters and clearance that its `section` sets beside it."""
     contact, diameters = keys.get("contact", {}), file.fit.diameters
     if not isinstance(contact, Mapping):
         return merged(keys, {"contact": diameters})
     twice = [key for key in (*diameters, "clearance") if key in contact]
     for key in twice:
-        file.fault(f"joint.contact.{key}", *BESIDE_FIT)
+        file.fault(f"{section}.contact.{key}", *BESIDE_FIT)
     return {**keys, "contact": merged({k: v for k, v in contact.items() if k not in twice}, diameters)}
 
 
@@ -145,7 +171,8 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "joint": _joint,
     "assumed": _assumed,
     "linkage": linkages.read,
-    "shaft": lambda file: file.model(DriveShaft, file.data["shaft"], "shaft") if "shaft" in file.data else None,
+    "joint2": _joint2,
+    "shaft": _shaft,
     "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
     "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
@@ -240,7 +267,11 @@ def _check_histories(file: Reading, output: Output, solver: Solver) -> None:
 
 
 def load(
-    path: str | Path | Mapping[str, Any], n: int | None = None, text: str | None = None, joint: Joint | None = None
+    path: str | Path | Mapping[str, Any],
+    n: int | None = None,
+    text: str | None = None,
+    joint: Joint | None = None,
+    joint2: Joint | None = None,
 ) -> Study:
     """Read a study file, or make a study of its sections.
 
@@ -255,6 +286,8 @@ def load(
         TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
     joint : Joint, optional
         Nominal joint in place of that of ``[joint]``; variants and swept dimensions are read from the file still.
+    joint2 : Joint, optional
+        Joint 2 of a drive shaft in place of that of ``[shaft.joint2]``.
 
     Returns
     -------
@@ -272,15 +305,15 @@ def load(
     file = Reading(Path(path), SECTIONS, text)
     if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
         file.data["sampling"]["n"] = n
-    if joint is not None:
-        file.parts["joint"] = joint
+    file.parts |= {name: own for name, own in (("joint", joint), ("joint2", joint2)) if own is not None}
     _read(file, READERS)
     _check(file)
     # of joints that the file lists or sweeps, nothing is known where it has faults
     whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
-        parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "shaft", "linkage")}
+        apart = ("scatter", "shaft", "joint2", "linkage")
+        parts = {name: part for name, part in file.parts.items() if name not in apart}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
         study = Study(file.path, file.text, **parts)
         with gather(file.faults):
@@ -311,7 +344,7 @@ def load_case(path: str | Path) -> Study:
             f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"
         )
         raise input_error(file.place, "is a study, not a case of one joint", remedy)
-    _read(file, ["joint", "linkage", "shaft"])
+    _read(file, ["joint", "linkage", "joint2", "shaft"])
     file.parts["points"] = ()
     with gather(file.faults):
         file.parts["points"] = (Point("", points.operation(file), 1.0),)

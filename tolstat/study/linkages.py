@@ -1,41 +1,17 @@
-"""Linkages of a study: ``[mechanism]``, and operating points without misalignment."""
+"""Linkages of a study: ``[mechanism]``."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
-
-from tolstat.common import units
 from tolstat.common.errors import InputError, gather
-from tolstat.common.strict import Strict
-from tolstat.joint import Linkage, orders
+from tolstat.joint import Linkage
 from tolstat.study.selection import Reading
 
 
-class DrivenPoint(Strict):
-    """Operating point of a linkage."""
-
-    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["30 rpm"])
-    """speed of the driven member, with orders { mean, orders }; of one that swings, periods: "30 rpm" is one in 2 s"""
-    torque: units.Torque = Field(default=0.0, examples=["40 N*m"])
-    """torque on the member `mechanism.loaded`, against its axis, with orders { mean, orders }"""
-    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
-    """orders of the speed, { n, amplitude, phase } each"""
-    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
-    """orders of the torque, { n, amplitude, phase } each"""
-    name: Annotated[str | None, Field(examples=["open"])] = None
-    """name of the operating point, of several ones"""
-    share: Annotated[units.Number | None, Field(gt=0, le=1)] = Field(default=None, examples=["60 %"])
-    """share of the service time, for fatigue; given for all points or for none"""
-
-    _split = model_validator(mode="before")(orders.split)
-
-
 def read(file: Reading) -> Linkage | None:
-    """``[mechanism]``: members and pairs. What follows reads names of its errors and loads: its faults end the reading."""
+    """``[mechanism]``: members and pairs. Its faults end the reading: what follows needs names of its errors."""
     if "mechanism" not in file.data:
         return None
     before = len(file.faults)

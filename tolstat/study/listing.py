@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
+from tolstat.common.error_fields import error_units
 from tolstat.common.errors import Fault, collected, gather, raise_all
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
@@ -20,7 +21,7 @@ from tolstat.joint.model import TOLD, laid_over, leaves, nested
 from tolstat.study import crosses, rewriting, selection
 from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube
 from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
-from tolstat.study.selection import Assignments, Entry, Reading, error_units
+from tolstat.study.selection import Assignments, Entry, Reading
 from tolstat.study.tolerances.entry import Site
 
 Section = tuple[int | str, ...]

@@ -20,9 +20,9 @@ from tolstat.study.tolerances.entry import Value
 _DEFAULTS = Options()
 
 MAX_ROWS = 10_000_000
-"""Maximum number of joints of a list, a grid or a Latin hypercube, whose tables are held in memory."""
+"""Maximum number of joints of a list or a grid, whose tables are held in memory."""
 MAX_SAMPLES = 1_000_000_000
-"""Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
+"""Maximum number of joints of a campaign that is drawn in parts."""
 
 Flag = Annotated[bool, Field(strict=True)]
 
@@ -75,7 +75,7 @@ class Solver(Strict):
         return from_names(settings | ({"fidelity": "dynamic"} if self.fidelity == "auto" else {}))
 
 
-SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "subset"]
+SamplingMethod = Literal["random", "sweep", "cases", "subset"]
 
 
 def _of_a_file(schema: dict[str, Any]) -> None:
@@ -86,27 +86,22 @@ def _of_a_file(schema: dict[str, Any]) -> None:
 class Sampling(Strict):
     """How many joints there are, and how they are drawn."""
 
-    method: SamplingMethod = Field(default="random", json_schema_extra=_of_a_file, examples=["sobol"])
-    """`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `sweep`, the grid of [sweep]; `cases`, the
-    joints of [[case]], [[variant]] and [grid]"""
+    method: SamplingMethod = Field(default="random", json_schema_extra=_of_a_file, examples=["sweep"])
+    """`random`, from the tolerances; `sweep`, the grid of [sweep]; `cases`, the joints of [[case]], [[variant]] and
+    [grid]"""
     n: int | None = Field(default=None, strict=True, ge=1, le=MAX_SAMPLES, examples=[1024])
     """number of joints without the nominal one; needed by all methods but `sweep` and `cases`"""
     seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
     """seed of all draws"""
     nominal_first: Flag = Field(default=True, examples=[False])
     """whether row 0 is the joint without errors, which statistics leave out; not with `cases`"""
-    replicates: int = Field(default=1, strict=True, ge=1, le=1000, examples=[8])
-    """number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares and quantiles then
-    have intervals"""
-
     joints_per_lot: int = Field(default=1, strict=True, ge=1, le=MAX_SAMPLES, examples=[20])
     """joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent"""
 
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `replicates` of one, and `joints_per_lot` of one: they have no effect."""
-        optional = ("replicates", "joints_per_lot")
-        return {key: value for key, value in write(self).items() if key not in optional or value > 1}
+        """Leave out `joints_per_lot` of one: it has no effect."""
+        return {key: value for key, value in write(self).items() if key != "joints_per_lot" or value > 1}
 
     @model_validator(mode="before")
     @classmethod
@@ -121,13 +116,6 @@ class Sampling(Strict):
             raise refuse(f"n is given with {self.method!r}", "leave n out: the file lists the joints")
         if drawn and self.n is None:
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
-        if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
-            raise refuse(f"a Latin hypercube of {self.n} joints", f"give at most n = {MAX_ROWS}, or another method")
-        if self.replicates > 1 and self.method not in ("sobol", "lhs"):
-            raise refuse(f"replicates is given with {self.method!r}", 'remove it, or write method = "sobol" or "lhs"')
-        if self.n is not None and self.n % self.replicates:
-            least = self.replicates * -(-self.n // self.replicates)
-            raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
         if self.joints_per_lot > 1 and self.method != "random":
             raise refuse(f"joints_per_lot is given with {self.method!r}", 'remove it, or write method = "random"')
         least = LEAST * self.joints_per_lot

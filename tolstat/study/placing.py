@@ -12,7 +12,7 @@ from typing import Any
 
 from tolstat.common.errors import InputError
 from tolstat.common.toml_lines import KeyPath, paths
-from tolstat.joint import reading
+from tolstat.joint import Joint, reading
 from tolstat.study import rewriting
 from tolstat.study.study import Study
 
@@ -45,21 +45,29 @@ def placed(text: str, source: Path, target: Path) -> str:
     return rewriting.with_keys(text, changes, str(target)) if changes else text
 
 
-def joint_beside(study: Study) -> str:
-    """Joint file of a study whose own one is not there, or is another one by now; empty where it need not be written.
+def joints_beside(study: Study) -> dict[KeyPath, str]:
+    """Joint files of a study whose own ones are not there, or are others by now, by the key path of their table.
 
-    A result file has its joint, and the name of the joint's file, but not the folder of the study.
+    A result file has its joints, and the names of the joints' files, but not the folder of the study.
     """
-    keys = tomllib.loads(study.text)["joint"]
+    data: Any = tomllib.loads(study.text)
+    written: dict[KeyPath, Joint] = {("joint",): study.joint}
+    written |= {("shaft", "joint2"): joint2} if (joint2 := study.operation.joint2) else {}
+    return {
+        path: f"# The joint of {study.name}.toml, with the keys that this study sets.\n"
+        + rewriting.as_text(joint.given("json"))
+        for path, joint in written.items()
+        if not _at_hand(study, reduce(getitem, path, data), joint)
+    }
+
+
+def _at_hand(study: Study, keys: Any, joint: Joint) -> bool:
+    """Whether the keys of a table of a study still make a joint."""
     keys = keys if study.fit is None else {**keys, "contact": keys.get("contact", {}) | study.fit.diameters}
     try:
-        joint = reading.load(keys["base"], keys, str(study.path), study.path.parent)
+        return reading.load(keys["base"], keys, str(study.path), study.path.parent).given() == joint.given()
     except InputError:
-        joint = None
-    if joint is not None and joint.given() == study.joint.given():
-        return ""
-    head = f"# The joint of {study.name}.toml, with the keys that this study sets.\n"
-    return head + rewriting.as_text(study.joint.given("json"))
+        return False
 
 
 def _between(path: Path, folder: Path) -> str:
@@ -77,5 +85,5 @@ def _files(data: Any) -> Iterator[tuple[KeyPath, str]]:
         if not isinstance(value, str):
             continue
         is_path = value.lower().endswith(".toml") or len(Path(value).parts) > 1
-        if path[-1] == "file" or (path[-2:] == ("joint", "base") and is_path):
+        if path[-1] == "file" or (path[-1] == "base" and path[-2] in ("joint", "joint2") and is_path):
             yield path, value

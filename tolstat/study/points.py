@@ -1,42 +1,19 @@
-"""Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name.
-
-Then settings of joints at them without effect: axial forces on a rigid shaft, swings without orders; and notes where
-rigid shafts decide, and where nothing holds pins along their holes.
-"""
+"""Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from shlex import quote
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import loads, units
-from tolstat.common.cardan import PARTS
 from tolstat.common.errors import Fault, InputError, gather, input_error
-from tolstat.common.mechanism import Mechanism
-from tolstat.common.strict import did_you_mean, refuse
-from tolstat.common.toml_lines import KeyPath
-from tolstat.joint import (
-    SPLINE,
-    DriveShaft,
-    Joint,
-    Linkage,
-    Operation,
-    OperationOfLinkage,
-    OperationOfShaft,
-    mechanism_of,
-    orders,
-)
-from tolstat.joint.ideal import NO_CLOSED_FORM
-from tolstat.joint.perturbation import unbalances
-from tolstat.joint.sections import FREE, RIGID
+from tolstat.common.strict import Strict, did_you_mean, refuse
+from tolstat.joint import DriveShaft, Linkage, Operation, OperationOfLinkage, OperationOfShaft, orders
 from tolstat.joint.shaft import check_misalignment
-from tolstat.study.axes import columns_of
-from tolstat.study.linkages import DrivenPoint
 from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
@@ -93,7 +70,7 @@ class Point(NamedTuple):
 
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
         ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
-        ``shaft`` with its keys in SI units.
+        ``shaft`` or ``linkage`` with its keys in SI units; of a linkage neither ``alpha`` nor ``axial_force``.
         """
         values = self.operation.model_dump()
         values = {key: value for key, value in values.items() if key not in ORDERS or value}
@@ -118,6 +95,30 @@ class PointEntry(Operation):
     """misalignment of joint 2 of a drive shaft at this point, in place of `shaft.alpha`"""
 
 
+class DrivenPoint(Strict):
+    """Operating point of a linkage."""
+
+    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["30 rpm"])
+    """speed of the driven member, with orders { mean, orders }; of one that swings, periods: "30 rpm" is one in 2 s"""
+    torque: units.Torque = Field(default=0.0, examples=["40 N*m"])
+    """torque on the member `mechanism.loaded`, against its axis, with orders { mean, orders }"""
+    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
+    """orders of the speed, { n, amplitude, phase } each"""
+    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
+    """orders of the torque, { n, amplitude, phase } each"""
+
+    _split = model_validator(mode="before")(orders.split)
+
+
+class DrivenPointEntry(DrivenPoint):
+    """One of several operating points of a linkage."""
+
+    name: Annotated[str, AfterValidator(check_name)] = Field(examples=["open"])
+    """name of the operating point"""
+    share: Annotated[units.Number | None, Field(gt=0, le=1)] = Field(default=None, examples=["60 %"])
+    """share of the service time, for fatigue; given for all points or for none"""
+
+
 def read(file: Reading) -> tuple[Point, ...]:
     """Read ``[operation]`` or ``[[operation]]``; empty if there are faults."""
     section, before = file.data.get("operation"), len(file.faults)
@@ -128,8 +129,8 @@ def read(file: Reading) -> tuple[Point, ...]:
         return tuple(points)
     for number, item in enumerate(section):
         with gather(file.faults):
-            entry = file.model(PointEntry if file.linkage is None else DrivenPoint, item, "operation", number)
-            check_name(entry.name or "")
+            model: type[PointEntry | DrivenPointEntry] = PointEntry if file.linkage is None else DrivenPointEntry
+            entry = file.model(model, item, "operation", number)
             if entry.name in [point.name for point in points]:
                 found = f"a point {entry.name!r} exists already"
                 file.fault(f"operation[{number}].name", found, "give each point its own name")
@@ -157,14 +158,14 @@ def operation(file: Reading) -> Operation:
     """
     if "operation" not in file.data:
         raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
-    model = Operation if file.linkage is None else DrivenPoint
+    model: type[Operation | DrivenPoint] = Operation if file.linkage is None else DrivenPoint
     return _of_mechanism(file, file.model(model, file.data["operation"], "operation"))
 
 
 def _of_mechanism(file: Reading, read: Operation | DrivenPoint, second: float | None = None) -> Operation:
     """Operating point of the mechanism of the file; of ``[shaft]`` with joint 2 and its misalignment at this point."""
-    if isinstance(read, DrivenPoint):
-        own = {key: getattr(read, key) for key in ("speed", "torque", *ORDERS)}
+    if file.linkage is not None:
+        own = {key: getattr(read, key) for key in DrivenPoint.model_fields}
         return OperationOfLinkage.model_construct(None, **own, linkage=file.linkage)
     values = {key: getattr(read, key) for key in Operation.model_fields}
     if file.shaft is None:
@@ -259,164 +260,3 @@ def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
     points = list(chosen)
     selection = "" if len(points) == len(names) else "+".join(points)
     return f"{load}{loads.AT}{selection}" if selection else load
-
-
-FORCE = "operation.axial_force"
-Varied = Mapping[str, Collection[str]]
-
-
-class Setting(NamedTuple):
-    """A joint at an operating point.
-
-    Attributes
-    ----------
-    path : tuple
-        Key path of the operating point in the file.
-    joint, operation : Joint, Operation
-        The joint and the point.
-    fidelity : str
-        ``solver.fidelity``.
-    """
-
-    path: KeyPath
-    joint: Joint
-    operation: Operation
-    fidelity: str
-
-    def moved(self, varied: Varied) -> bool:
-        """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and bool({FORCE, SPLINE} & varied.keys() or self.operation.axial_force != 0.0)
-
-
-def no_closed_form(settings: Iterable[Setting], varied: Varied) -> Iterator[tuple[str, str]]:
-    """Why closed forms do not hold for some joints, and the remedy, of each reason; `varied` as in `refusals`."""
-    every, remedy = list(settings), 'write "quasistatic" or "dynamic"'
-    if any(setting.moved(varied) for setting in every):
-        yield NO_CLOSED_FORM
-    if any(setting.joint.friction.mu is not None for setting in every):
-        yield "'ideal' does not hold with friction, which its closed forms leave out", remedy
-    if any(isinstance(setting.operation, OperationOfLinkage) for setting in every):
-        yield "'ideal' does not hold for a linkage: its closed forms are those of one joint", remedy
-    if any(isinstance(setting.operation, OperationOfShaft) for setting in every):
-        yield "'ideal' does not hold for a drive shaft: its closed forms are those of one joint", remedy
-
-
-def idle_forces(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
-    """Refuse axial forces, and their scatter, on output shafts that are rigid; parameters and items as `refusals`."""
-    if any(isinstance(setting.operation, OperationOfLinkage) for setting in settings):
-        return
-    if not any(setting.joint.shaft.slides for setting in settings):
-        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
-        own = [setting.joint for setting in settings if not isinstance(setting.operation, OperationOfShaft)]
-        paths += [("joint", "shaft", "spline")] * any(joint.shaft.spline for joint in own)
-        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or ' * bool(own) + "remove it"
-        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
-            yield path, "has no effect: the output shaft is rigid along its axis", remedy
-
-
-def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
-    """Refuse what has no effect, closed forms where they do not hold, and joints with different parts.
-
-    Of drive shafts, refuse what only one joint can have, and what holds no tube. For forces see `idle_forces`.
-
-    Parameters
-    ----------
-    settings : sequence of Setting
-        All joints of a study at all of their operating points.
-    varied : mapping
-        Errors that scatter or are swept, to the sections of the study in which they do.
-
-    Yields
-    ------
-    tuple
-        Key path, what was found, remedy.
-    """
-    of_shafts = [setting for setting in settings if isinstance(setting.operation, OperationOfShaft)]
-    for key in ("speed", "torque"):
-        if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
-            remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
-            for section in varied.get(f"operation.{key}_swing", ()):
-                yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
-    for part in PARTS:
-        if len({part in setting.joint.parts for setting in settings}) > 1:
-            found = f"some joints of the study have {part.replace('_', ' ')}, others have none"
-            yield ("joint",), found, "give it to all of them, or to none"
-    for body, (unbalance, _) in (found for s in settings for found in unbalances(s.joint, s.operation).items()):
-        if unbalance and unbalance.angle is None and not varied.get(f"{body}.unbalance_angle"):
-            uniform = '{ plus_minus = "180 deg", distribution = "uniform" }'
-            path, bodies = (("joint", "shaft"), body) if body == "output" else (("shaft", "tube"), "tube*")
-            remedy = f'write "{bodies}.unbalance_angle" = {uniform} under [tolerances], or give its angle'
-            yield (*path, "unbalance"), "has no direction", remedy
-    if any(setting.joint.thrust is None for setting in of_shafts):
-        found = "missing: pins that slide freely locate no tube across its axis"
-        yield ("joint", "thrust"), found, 'give end_play = "0.02 mm" and k = "1e8 N/m", of yours, or remove [shaft]'
-    if any(setting.joint.shaft.axial == FREE for setting in of_shafts if mechanism_of(*setting[1:3]).spline):
-        yield ("joint", "shaft", "axial"), "is free beside a spline: nothing holds the shaft", 'write axial = "rigid"'
-    if any(setting.joint.shaft.spline for setting in of_shafts):
-        remedy = "write shaft.spline, that of the tubes, or remove it"
-        yield ("joint", "shaft", "spline"), "is that of one joint", remedy
-    for texts in no_closed_form((setting for setting in settings if setting.fidelity == "ideal"), varied):
-        yield ("solver", "fidelity"), *texts
-
-
-def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
-    """Command that runs a study with an output shaft that is free along its axis.
-
-    Parameters
-    ----------
-    study, stem : str
-        Study file, and its name without ending.
-    joint : Joint
-        The study's joint; what a free shaft needs and it lacks is in the command, too.
-    """
-    needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
-    lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
-    settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
-    return f"tolstat run {quote(study)} {settings} --out {quote(f'{stem}_free.h5')}"
-
-
-def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], mechanism: Mechanism, command: str) -> str:
-    """Say what rigid shafts do to errors along them, and the command that tries a free one.
-
-    Parameters
-    ----------
-    toleranced : iterable of str
-        Errors and zones that scatter.
-    axial : iterable of float or str
-        ``shaft.axial`` of each variant.
-    mechanism : Mechanism
-        What is simulated.
-    command : str
-        The command.
-
-    Returns
-    -------
-    str
-        Empty where a shaft may move or a spline gives way, or no error along the shafts scatters.
-    """
-    along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
-    if not along or not mechanism.cardan or mechanism.spline or any(value != RIGID for value in axial):
-        return ""
-    return (
-        "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        f"them: some loads are larger than with a spline.\nWith a free output shaft: {command}"
-    )
-
-
-def note_on_pins(toleranced: Iterable[str], mechanism: Mechanism) -> str:
-    """Say that errors along pins have hardly any effect where nothing holds the pins.
-
-    Parameters
-    ----------
-    toleranced : iterable of str
-        Errors and zones that scatter; without one along a pin there is nothing to say.
-    mechanism : Mechanism
-        What is simulated; with thrust faces there is nothing to say.
-    """
-    along = any(column.endswith(".offset_e") for name in toleranced for column in columns_of(name))
-    if not along or mechanism.faces:
-        return ""
-    return (
-        "errors along the pins (offset_e) scatter, and have hardly any effect: without thrust faces pins slide freely "
-        "along their holes. Snap rings and cups that hold them: joint.thrust, see tolstat docs study."
-    )

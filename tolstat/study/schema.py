@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from tolstat.common import loads, strict
 from tolstat.common.cardan import CARDAN, MECHANISMS, PARTS, SHAFT, SPLINED, named
 from tolstat.common.channels import components, planes
+from tolstat.common.error_fields import error_units, given_units
 from tolstat.common.files import data_dir
 from tolstat.common.loads import units_of_limits
 from tolstat.common.mechanism import Mechanism
@@ -32,7 +33,7 @@ from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
-from tolstat.study.selection import error_units, given_units, halves, joints, toleranced_units
+from tolstat.study.selection import halves, joints, toleranced_units
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES

@@ -15,10 +15,10 @@ from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
 from tolstat.common.cardan import PARTS
+from tolstat.common.error_fields import error_units, given_units
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
-from tolstat.common.tables import tables
 from tolstat.common.units import to_si
 from tolstat.joint.linked import linkage_mechanism
 from tolstat.joint.model import giving
@@ -28,18 +28,6 @@ from tolstat.study import signals
 from tolstat.study.axes import alike, columns_of, compatible, is_pair, is_zone, own, zone_of, zone_units
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
-
-
-@cache
-def error_units(mechanism: Mechanism) -> dict[str, str]:
-    """SI unit of every error, in the order of the table."""
-    return {field.name: field.unit for field in tables(mechanism).error_fields}
-
-
-@cache
-def given_units(mechanism: Mechanism) -> dict[str, str]:
-    """SI unit of the errors that ``[errors]`` and a case can give."""
-    return {name: unit for name, unit in error_units(mechanism).items() if not name.startswith("operation.")}
 
 
 @cache
@@ -299,10 +287,10 @@ class Reading:
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        parts = self.joint.parts if self.joint else PARTS
-        if self.linkage:
-            return linkage_mechanism(self.linkage, parts)
-        return by_keys(self.data.get("shaft"), parts)
+        first, second = (joint.parts if (joint := self.parts.get(name)) else PARTS for name in ("joint", "joint2"))
+        if self.linkage is not None:
+            return linkage_mechanism(self.linkage, first)
+        return by_keys(self.data.get("shaft"), first, second)
 
     def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
         """Note a fault of a key or key path, once: several parts may read one section."""

@@ -24,12 +24,13 @@ from tolstat.common.wording import Wording, row_of
 from tolstat.joint import SPLINE, Joint, Operation, OperationOfLinkage, affecting_results, mechanism_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
-from tolstat.study import points
+from tolstat.study import mounting
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
-from tolstat.study.points import Point, Setting, limits_at, only_one
+from tolstat.study.mounting import Setting
+from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.tolerances.correlation import Copula, Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Toleranced
@@ -136,7 +137,7 @@ class Study:
         return lined
 
     def check_mounting(self, idle_forces: bool = False) -> None:
-        """Refuse settings without effect, see `points.refusals`, and deviations that no joint can have.
+        """Refuse settings without effect, see `mounting.refusals`, and deviations that no joint can have.
 
         With `idle_forces` axial forces without effect are accepted.
 
@@ -145,20 +146,21 @@ class Study:
         InputError
             With every such setting.
         """
-        refused = [*points.refusals(self._settings, self._varied), *self._impossible()]
+        refused = [*mounting.refusals(self._settings, self._varied), *self._impossible()]
         raise_all([*([] if idle_forces else self.idle_forces), *self._faults(refused)])
 
     @property
     def idle_forces(self) -> list[Fault]:
-        """Axial forces, and their scatter, without effect, see `points.idle_forces`."""
-        return self._faults(points.idle_forces(self._settings, self._varied))
+        """Axial forces, and their scatter, without effect, see `mounting.idle_forces`."""
+        return self._faults(mounting.idle_forces(self._settings, self._varied))
 
     def _faults(self, refused: Iterable[tuple[KeyPath, str, str]]) -> list[Fault]:
         return [self.fault(dotted(path), *texts) for path, *texts in refused]
 
     def _impossible(self) -> Iterator[tuple[KeyPath, str, str]]:
         """Deviations that take the friction of a joint below zero, and forces above that which a spline can hold."""
-        mu = min((joint.friction.mu for joint in self.joints if joint.friction.mu is not None), default=math.inf)
+        every = (joint for setting in self._settings for joint in setting.joints)
+        mu = min((joint.friction.mu for joint in every if joint.friction.mu is not None), default=math.inf)
         for path, (least, _) in self._given(MU).items():
             if mu + least < 0.0:
                 found = f"takes friction.mu = {mu:g} of the joint down to {mu + least:.3g}, below zero"
@@ -187,16 +189,17 @@ class Study:
 
     @property
     def no_closed_form(self) -> list[tuple[str, str]]:
-        """Why closed forms do not hold for some of the joints, see `points.no_closed_form`; empty where they do."""
-        return list(points.no_closed_form(self._settings, self._varied))
+        """Why closed forms do not hold for some of the joints, see `mounting.no_closed_form`; empty where they do."""
+        return list(mounting.no_closed_form(self._settings, self._varied))
 
     @property
     def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
-        laws = [joint.contact.law for joint in self.joints]
+        every = [setting.joints for setting in self._settings]
+        laws = [joint.contact.law for joints in every for joint in joints]
         if isinstance(self.operation, OperationOfLinkage):
             return f"{self.operation.linkage.in_words}{mounting_and_law([], laws)}"
-        return mounting_and_law([joint.shaft.axial for joint in self.joints], laws)
+        return mounting_and_law([joints[-1].shaft.axial for joints in every], laws)
 
     @property
     def _settings(self) -> list[Setting]:
@@ -336,6 +339,8 @@ class Study:
         the same rows with the same results.
         """
         points = {point.name: point.operation.model_dump() for point in self.points}
+        for of_shaft in (point["shaft"] for point in points.values() if "shaft" in point):
+            del of_shaft["joint2"]
         parts: dict[str, Any] = {
             "joint": affecting_results(self.joint.given("json")),
             "operation": points.get("", points),
@@ -348,6 +353,7 @@ class Study:
             "output": self.output.identity(self.mechanism),
         }
         optional = {
+            "joint2": affecting_results(self.operation.joint2.given("json")) if self.operation.joint2 else {},
             "axes": {name: axis.describe() for name, axis in self.axes.items()},
             "lots": {name: list(lot) for name, lot in self.lots.items()},
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],

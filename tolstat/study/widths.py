@@ -90,7 +90,7 @@ def features(study: Study) -> list[Group]:
     """Each pin with its hole: all that is drawn of the two."""
     groups = [
         Group(f"{pin} and {hole}", tuple(name for name in _drawn(study) if name.rpartition(".")[0] in (pin, hole)))
-        for pin, hole, _ in study.mechanism.pairs
+        for pin, hole, *_ in study.mechanism.pairs
     ]
     return [group for group in groups if group.names]
 
@@ -176,7 +176,8 @@ def after(study: Study, line: Group, step: str) -> Study:
     fit = study.fit._replace(entry=study.fit.entry.model_copy(update={"code": step}))
     diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in fit.diameters.items()}
     # the joint file need not be there any more: the joint in hand has all that it gave
-    return applied(load(study.path, study.sampling.n, text, varied(study.joint, diameters)), {})
+    joints = [varied(joint, diameters) for joint in (study.joint, study.operation.joint2) if joint]
+    return applied(load(study.path, study.sampling.n, text, *joints), {})
 
 
 def changed(study: Study, line: Group, step: str) -> dict[str, Distribution]:

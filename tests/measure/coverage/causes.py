@@ -81,12 +81,11 @@ def experiments() -> Iterator[Experiment]:
 def _given_data(load: Load, n: int) -> Experiment:
     known = load.known or (BENT if load.name == "Ishigami" and n < 1000 else "")
     cases = [(f"{load.name}, error {k + 1}", n, np.nan, known) for k in range(3)]
-    asked = [Asked(name, *case) for name in ("index alone", "index in all") for case in cases]
+    asked = [Asked("index alone", *case) for case in cases]
 
     def once(rng: Rng) -> list[Found]:
         x = load.draw(rng, (n, 3))
-        first, total = sensitivity.first_and_total(x, load.of(x))
-        return found(first, load.first) + found(total, load.total)
+        return found(sensitivity.first_order(x, load.of(x)), load.first)
 
     return Experiment(tuple(asked), once)
 

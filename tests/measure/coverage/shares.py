@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import norm, qmc
+from scipy.stats import norm
 
 from tests.measure.coverage.trial import (
     Asked,
@@ -24,7 +23,7 @@ from tests.measure.coverage.trial import (
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent, Replicated
+from tolstat.analysis.design import Design, Independent
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import FloatArray
 
@@ -41,10 +40,6 @@ def experiments() -> Iterator[Experiment]:
             yield _independent(known[name], n)
     for n in (100, 1024):
         yield _unresolved(known["lognormal"], n)
-    for method in ("Sobol'", "Latin hypercube"):
-        for dimensions in (3, 10):
-            for share in (0.5, 0.05, 0.005):
-                yield _replicated(method, dimensions, share)
     for share in SHARES:
         for n in (100, 1024):
             yield _delivered(share, n)
@@ -113,27 +108,14 @@ def _delivered(share: float, n: int) -> Experiment:
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
 
-def _of_normal(design: str, case: str, n: int, share: float) -> tuple[list[Asked], Callable[[Sample], list[Found]]]:
-    """Share above a level, and load that the other joints stay at or below, of standard normal loads."""
+def _of_normal(case: str, n: int, share: float) -> tuple[list[Asked], Callable[[Sample], list[Found]]]:
+    """Share above a level, and load that the other joints stay at or below, of standard normal loads of lots."""
     law, level = laws()["normal"], float(norm.isf(share))
     asked = [
-        Asked(f"share, {design}", case, n, fresh_share(n, share)),
-        Asked(f"quantile, {design}", case, n, law.fresh_quantile(n, 1.0 - share)),
+        Asked("share, lots", case, n, fresh_share(n, share)),
+        Asked("quantile, lots", case, n, law.fresh_quantile(n, 1.0 - share)),
     ]
     return asked, lambda sample: [*shares_at(sample, {level: share}), *quantiles_at(sample, {1.0 - share: level})]
-
-
-def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts: int = 8) -> Experiment:
-    """Sum of normal errors, drawn in eight randomisations of a design."""
-    asked, judged = _of_normal("replicates", f"{method}, sum of {dimensions} errors, {share:g}", n, share)
-    engine = qmc.Sobol if method == "Sobol'" else qmc.LatinHypercube
-    design = Replicated(n, parts, method)
-
-    def once(rng: Rng) -> list[Found]:
-        points = np.concatenate([engine(dimensions, rng=rng).random(n // parts) for _ in range(parts)])
-        return judged(sample_of(ndtri(points).sum(axis=1) / np.sqrt(dimensions), design))
-
-    return Experiment(tuple(asked), once)
 
 
 class _Lots(NamedTuple):
@@ -175,7 +157,7 @@ _LOTS = (
 def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
     level, n = float(norm.isf(share)), number * JOINTS
     case = f"{law.name}, {share:g}, {number} lots"
-    asked, judged = _of_normal("lots", case, n, share)
+    asked, judged = _of_normal(case, n, share)
     design = Clustered(np.arange(n) // JOINTS)
 
     def once(rng: Rng) -> list[Found]:

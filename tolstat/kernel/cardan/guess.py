@@ -57,13 +57,14 @@ def travel_to_contact(pin, side, across, par, work):
     tuple of float
         Displacement and distance of the station from O, m.
     """
-    load = abs(work.drive[2]) / (2 * par.R)
+    kind, R = par.pair_kind[pin], par.at[par.lump_kind[par.pin[pin]], 0]
+    load = abs(work.drive[2]) / (2 * R)
     best, radius = 0.0, 0.0
-    for j in (0, par.n_stations - 1):
-        reach = par.clearance[pin] + par.delta_d + penetration(load, j, par.clearance[pin], par)
+    for j in (0, par.n_stations[kind] - 1):
+        reach = par.clearance[pin] + par.delta_d[kind] + penetration(load, kind, j, par.clearance[pin], par)
         reach = max(math.sqrt(max(reach * reach - across * across, 0.0)), LEAST * reach)
         along, _ = offset(pin, j, par, work)
-        want, r = side * reach - along, par.R + par.station_s[j]
+        want, r = side * reach - along, R + par.station_s[kind, j]
         if radius == 0 or side * want / r < side * best / radius:
             best, radius = want, r
     return best, radius
@@ -113,7 +114,8 @@ def place_joint(joint, by_input, at_rest, par, work, q):
         locate_all(q, at_rest, par, work)
     z0, z1 = middle(first, par, work), middle(first + 1, par, work)
     z2, z3 = middle(first + 2, par, work), middle(first + 3, par, work)
-    about_x, about_y = -(z0 - z1) / (2 * par.R), (z2 - z3) / (2 * par.R)
+    R = par.at[par.lump_kind[par.pin[first]], 0]
+    about_x, about_y = -(z0 - z1) / (2 * R), (z2 - z3) / (2 * R)
     up = -0.25 * (z0 + z1 + z2 + z3)
     across = 0.25 * abs(z0 + z1 - z2 - z3)
 
@@ -186,7 +188,7 @@ def shift_along_axis(joint, par, work):
 @njit
 def middle(pin, par, work):
     """Displacement (m) of `pin` along z of the cross, mean over its stations."""
-    total = 0.0
-    for j in range(par.n_stations):
+    total, stations = 0.0, par.n_stations[par.pair_kind[pin]]
+    for j in range(stations):
         total += offset(pin, j, par, work)[1]
-    return total / par.n_stations
+    return total / stations

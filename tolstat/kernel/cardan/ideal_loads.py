@@ -32,7 +32,7 @@ ZERO = (0.0, 0.0, 0.0)
 @njit
 def contact_radius(par):
     """Distance R' (m) of the contacts from O: distance R of the reference points plus the outermost station's s."""
-    return par.R + par.station_s[0]
+    return par.R + par.station_s[0, 0]
 
 
 @njit

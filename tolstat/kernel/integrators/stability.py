@@ -75,11 +75,11 @@ def multiply(h, depth, par, work):
         about = press_on(h, k[3], c[3]), press_on(h, k[4], c[4]), press_on(h, k[5], c[5])
         connect(lump, base, on_lump, on_base, along, about, par, work)
     for pin in range(par.pin.shape[0]):
-        body = par.pin[pin]
-        for j in range(par.n_stations):
-            _, slope = elastic(j, depth, par.clearance[pin], has_needles(par), par)
-            across = press_on(h, slope, max(par.c_d, par.c_t) * par.station_weight[j])
-            at = from_triad(body, (par.station_s[j], 0.0, 0.0), par)
+        body, kind = par.pin[pin], par.pair_kind[pin]
+        for j in range(par.n_stations[kind]):
+            _, slope = elastic(kind, j, depth, par.clearance[pin], has_needles(kind, par), par)
+            across = press_on(h, slope, max(par.c_d[kind], par.c_t[kind]) * par.station_weight[kind, j])
+            at = from_triad(body, (par.station_s[kind, j], 0.0, 0.0), par)
             connect(body, par.hole[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), par, work)
 
 
@@ -160,8 +160,11 @@ def widest(par):
 @njit
 def depth_at(force, par):
     """Depth (m) to which a normal force (N) presses an end station at most; infinite without stiffness."""
-    depth = penetration(force, 0, widest(par), par)
-    return depth if depth > 0 else math.inf
+    deepest = 0.0
+    for kind in range(par.n_stations.shape[0]):
+        depth = penetration(force, kind, 0, widest(par), par)
+        deepest = max(deepest, depth if depth > 0 else math.inf)
+    return deepest
 
 
 @njit
@@ -199,4 +202,7 @@ def largest_force(steps, par, work):
         if not eigenvalue(h, DEEPER * depth, par, work) <= STABLE:
             break
         depth *= DEEPER
-    return elastic(0, depth, widest(par), has_needles(par), par)[0]
+    least = math.inf
+    for kind in range(par.n_stations.shape[0]):
+        least = min(least, elastic(kind, 0, depth, widest(par), has_needles(kind, par), par)[0])
+    return least

@@ -73,13 +73,13 @@ def push(pin, point, f_hole, par, work):
 @njit
 def locate(pin, par, work):
     """Write position, normal, penetration and velocity of each station of `pin` to ``work.station[pin]``."""
-    body, hole = par.pin[pin], par.hole[pin]
+    body, hole, kind = par.pin[pin], par.hole[pin], par.pair_kind[pin]
     axis = turn(work.rot, hole, row(par.hole_axis, pin))
     centre = add(row(work.pos, hole), turn(work.rot, hole, row(par.hole_point, pin)))
     origin = turn(work.rot, body, row(par.pin_point, pin))
     direction = turn(work.rot, body, row(par.pin_axis, pin))
-    for j in range(par.n_stations):
-        lever = axpy(par.station_s[j], direction, origin)
+    for j in range(par.n_stations[kind]):
+        lever = axpy(par.station_s[kind, j], direction, origin)
         point, velocity = in_hole(pin, lever, par, work)
         d = sub(point, centre)
         gap = axpy(-dot(d, axis), axis, d)
@@ -103,28 +103,29 @@ def locate(pin, par, work):
 @njit
 def press(pin, par, work):
     """Write force, eq. (5), its slopes by delta and its rate, and the film's constant to ``work.station[pin]``."""
-    needles, steepness = has_needles(par), 1 / par.delta_d
-    for j in range(par.n_stations):
+    kind = par.pair_kind[pin]
+    needles, steepness = has_needles(kind, par), 1 / par.delta_d[kind]
+    for j in range(par.n_stations[kind]):
         station = work.station[pin, j]
         delta = station[DELTA]
         touching = delta > 0
         if not any_of(touching):
             station[FORCE] = station[SLOPE] = station[DAMPING] = station[FILM] = 0.0
             continue
-        ramp = par.station_weight[j] * smooth_step(delta * steepness)
-        ramp_slope = par.station_weight[j] * smooth_step_slope(delta * steepness) * steepness
-        force, slope = elastic(j, delta, par.clearance[pin], needles, par)
-        total = force + par.c_d * ramp * station[V_NORMAL]
+        ramp = par.station_weight[kind, j] * smooth_step(delta * steepness)
+        ramp_slope = par.station_weight[kind, j] * smooth_step_slope(delta * steepness) * steepness
+        force, slope = elastic(kind, j, delta, par.clearance[pin], needles, par)
+        total = force + par.c_d[kind] * ramp * station[V_NORMAL]
         pressed = touching & (total > 0)
         station[FORCE] = where(pressed, total, 0.0)
-        station[SLOPE] = where(pressed, slope + par.c_d * ramp_slope * station[V_NORMAL], 0.0)
-        station[DAMPING], station[FILM] = where(pressed, par.c_d * ramp, 0.0), par.c_t * ramp
+        station[SLOPE] = where(pressed, slope + par.c_d[kind] * ramp_slope * station[V_NORMAL], 0.0)
+        station[DAMPING], station[FILM] = where(pressed, par.c_d[kind] * ramp, 0.0), par.c_t[kind] * ramp
 
 
 @njit
 def classify(pin, par, work):
     """Contact mode of `pin` from its two end stations: which of them touch, and whether on the same side."""
-    outer, inner = work.station[pin, 0], work.station[pin, par.n_stations - 1]
+    outer, inner = work.station[pin, 0], work.station[pin, par.n_stations[par.pair_kind[pin]] - 1]
     cosine = 0.0
     for k in range(3):
         cosine += outer[NORMAL + k] * inner[NORMAL + k]
@@ -138,8 +139,8 @@ def contact_load(pin, par, work):
     """Add the contact forces of `pin` to pin and hole; write ``work.contact[pin]`` and ``work.mode[pin]``."""
     locate(pin, par, work)
     press(pin, par, work)
-    total = (0.0, 0.0, 0.0)
-    for j in range(par.n_stations):
+    total, stations = (0.0, 0.0, 0.0), par.n_stations[par.pair_kind[pin]]
+    for j in range(stations):
         station = work.station[pin, j]
         if not any_of(station[DELTA] > 0):
             continue
@@ -151,6 +152,6 @@ def contact_load(pin, par, work):
         total = add(total, f_hole)
         push(pin, point, f_hole, par, work)
     work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
-    work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]
+    work.contact[pin, INNER] = work.station[pin, stations - 1, FORCE]
     work.contact[pin, RESULTANT] = math.sqrt(dot(total, total))
     work.mode[pin] = classify(pin, par, work)

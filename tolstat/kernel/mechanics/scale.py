@@ -45,7 +45,10 @@ def mean_clearance(lane, par):
     pins = par.pin.shape[0]
     for pin in range(pins):
         total += pick(par.clearance[pin], lane)
-    return max(total / pins, pick(par.delta_d, lane))
+    least = 0.0
+    for kind in range(par.delta_d.shape[0]):
+        least = max(least, pick(par.delta_d[kind], lane))
+    return max(total / pins, least)
 
 
 @njit
@@ -53,9 +56,11 @@ def centring_stiffness(lane, par):
     """Axial stiffness (N/m) by which loaded pins, centred in round holes, hold a shaft; 0 if it is rigid.
 
     A pin that a force presses across a clearance is centred in the hole by the force over the clearance; both pins of
-    an axis act together, and the two axes one after the other: T_r / (2 (R + s_0) c), s_0 the outermost station's s.
+    an axis act together, and the two axes one after the other: T_r / (2 (R + s_0) c), s_0 the outermost station's s, of
+    the joint before the shaft.
     """
-    radius = pick(par.R, lane) + pick(par.station_s[0], lane)
+    last = par.pin.shape[0] - 1
+    radius = pick(par.at[par.lump_kind[par.pin[last]], 0], lane) + pick(par.station_s[par.pair_kind[last], 0], lane)
     centring = abs(pick(par.torque, lane)) / (2 * radius * mean_clearance(lane, par))
     return centring if pick(par.slides, lane) > 0 else 0.0
 

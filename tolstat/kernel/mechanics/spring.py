@@ -16,19 +16,19 @@ ACCURATE = 1e-12
 
 
 @njit
-def has_needles(par):
-    """Whether pins of any lane turn on needles."""
-    return any_of(par.needle_b > 0)
+def has_needles(kind, par):
+    """Whether pins of a kind of pair turn on needles in any lane."""
+    return any_of(par.needle_b[kind] > 0)
 
 
 @njit
-def elastic(j, delta, clearance, needles, par):
+def elastic(kind, j, delta, clearance, needles, par):
     """Force (N) of station `j` at a penetration above zero, and its slope (N/m); no numbers at others.
 
     Parameters
     ----------
-    j : int
-        Number of the station.
+    kind, j : int
+        Kind of the pair, and number of the station.
     delta : float or lanes
         Penetration, m.
     clearance : float or lanes
@@ -38,38 +38,38 @@ def elastic(j, delta, clearance, needles, par):
     par : record of PARAM
         The joint.
     """
-    force = (par.station_k1[j] * delta + par.station_k2[j]) * delta
-    slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
+    force = (par.station_k1[kind, j] * delta + par.station_k2[kind, j]) * delta
+    slope = 2 * par.station_k1[kind, j] * delta + par.station_k2[kind, j]
     if needles:
-        lost = par.needle_b * clearance
+        lost = par.needle_b[kind] * clearance
         share = 1 / (delta + lost)
-        secant = par.station_k3[j] * math.sqrt(math.sqrt(math.sqrt(delta))) * math.sqrt(delta * share)
-        on_needles = par.station_k3[j] > 0
+        secant = par.station_k3[kind, j] * math.sqrt(math.sqrt(math.sqrt(delta))) * math.sqrt(delta * share)
+        on_needles = par.station_k3[kind, j] > 0
         force += where(on_needles, secant * delta, 0.0)
         slope += where(on_needles, secant * (1.125 + 0.5 * lost * share), 0.0)
     return force, slope
 
 
 @njit
-def penetration(force, j, clearance, par):
+def penetration(force, kind, j, clearance, par):
     """Penetration (m) at which station `j` carries a force; 0 for a station without stiffness.
 
     Parameters
     ----------
     force : float
         Force, N.
-    j, clearance, par
+    kind, j, clearance, par
         As in `elastic`.
     """
-    k1, k2 = par.station_k1[j], par.station_k2[j]
+    k1, k2 = par.station_k1[kind, j], par.station_k2[kind, j]
     slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * force)
     delta = 2 * force / slope if slope > 0 else 0.0
-    if not (par.station_k3[j] > 0 and force > 0):
+    if not (par.station_k3[kind, j] > 0 and force > 0):
         return delta
     if delta == 0:
-        delta = (force / par.station_k3[j]) ** (8 / 9)
+        delta = (force / par.station_k3[kind, j]) ** (8 / 9)
     for _ in range(TRIES):  # Newton's iteration in the logarithms, in which the force is nearly straight
-        reached, rise = elastic(j, delta, clearance, True, par)
+        reached, rise = elastic(kind, j, delta, clearance, True, par)
         delta *= (force / reached) ** (reached / (rise * delta))
         if abs(reached - force) <= ACCURATE * force:
             break

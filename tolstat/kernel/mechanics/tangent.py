@@ -230,7 +230,7 @@ def contact_tangent(pin, cv, par, work):
     What damping and film couple, a force along n with a displacement along m or the reverse, is not symmetric, and left
     out.
     """
-    for j in range(par.n_stations):
+    for j in range(par.n_stations[par.pair_kind[pin]]):
         station = work.station[pin, j]
         touching = station[DELTA] > 0
         if not any_of(touching):
@@ -255,7 +255,7 @@ def point_tangent(pin, station, nn, mm, par, work):
 @njit
 def friction_tangent(pin, cv, par, work):
     """Add the friction of `pin`, its change with the force that presses left out; `cv`: 1/s."""
-    for j in range(par.n_stations):
+    for j in range(par.n_stations[par.pair_kind[pin]]):
         rubbing = work.rubbing[pin, j]
         if any_of(rubbing[DAMPING] > 0):
             point_tangent(pin, rubbing, cv * rubbing[SLOPE], cv * rubbing[DAMPING], par, work)

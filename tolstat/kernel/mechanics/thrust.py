@@ -11,16 +11,16 @@ from tolstat.kernel.simd.lane import where
 def thrust_load(face, par, work):
     """Add the force of a thrust face to pin and hole; write ``work.face[face]``."""
     pin, end = par.face_pair[face], 1.0 * par.face_end[face]
-    body, hole, of_face = par.pin[pin], par.hole[pin], work.face[face]
+    body, hole, kind, of_face = par.pin[pin], par.hole[pin], par.pair_kind[pin], work.face[face]
     on_pin = axpy(par.face_at[face, 0], row(par.pin_axis, pin), row(par.pin_point, pin))
     on_hole = axpy(par.face_at[face, 1], row(par.hole_axis, pin), row(par.hole_point, pin))
     point, velocity = in_hole(pin, turn(work.rot, body, on_pin), par, work)
     normal = scale(end, turn(work.rot, hole, row(par.hole_axis, pin)))
     delta = dot(sub(point, add(row(work.pos, hole), turn(work.rot, hole, on_hole))), normal)
-    steepness, rate = 1 / par.delta_d, dot(velocity, normal)
-    damping = par.face_c * smooth_step(delta * steepness)
-    slope = par.face_k + par.face_c * smooth_step_slope(delta * steepness) * steepness * rate
-    force = par.face_k * delta + damping * rate
+    steepness, rate = 1 / par.delta_d[kind], dot(velocity, normal)
+    damping = par.face_c[kind] * smooth_step(delta * steepness)
+    slope = par.face_k[kind] + par.face_c[kind] * smooth_step_slope(delta * steepness) * steepness * rate
+    force = par.face_k[kind] * delta + damping * rate
     pressed = (delta > 0) & (force > 0)
     of_face[DELTA], of_face[FORCE] = delta, where(pressed, force, 0.0)
     of_face[SLOPE], of_face[DAMPING] = where(pressed, slope, 0.0), where(pressed, damping, 0.0)

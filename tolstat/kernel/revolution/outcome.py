@@ -28,6 +28,17 @@ def is_near(body, point, axis, par):
 
 
 @njit
+def bears(kind, par):
+    """Whether the stations of a kind of pair stiffen under load, as those of the model do."""
+    good, stiff = par.needle_b[kind] >= 0, False
+    for j in range(par.n_stations[kind]):
+        k1, k2, k3 = par.station_k1[kind, j], par.station_k2[kind, j], par.station_k3[kind, j]
+        good = good and k1 >= 0 and k2 >= 0 and k3 >= 0 and (par.needle_b[kind] > 0 or k3 == 0)
+        stiff = stiff or k2 > 0 or k3 > 0
+    return good and stiff
+
+
+@njit
 def inside_model(par):
     """Whether a joint lies within the scope of the model; written so that NaN does not."""
     good = 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
@@ -43,13 +54,8 @@ def inside_model(par):
         for k in range(6):
             total += par.k[kind, k]
         good = good and total > 0
-    good = good and par.needle_b >= 0
-    bears = False
-    for j in range(par.n_stations):
-        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
-        good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
-        bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
-    good = good and bears and par.mu >= 0 and par.face_k >= 0
+    for kind in range(par.n_stations.shape[0]):
+        good = good and bears(kind, par) and par.mu[kind] >= 0 and par.face_k[kind] >= 0
     for face in range(par.face_pair.shape[0]):
         good = good and abs(par.face_at[face, 1] - par.face_at[face, 0]) <= MAX_SHIFT * par.R
     for pin in range(par.pin.shape[0]):

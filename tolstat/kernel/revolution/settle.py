@@ -74,13 +74,13 @@ def grid_step(par, options):
 @njit
 def pressed(pin, lane, par, work):
     """Which stations of `pin` carry a force, and whether a face does, as bits."""
-    bits = 0
-    for j in range(par.n_stations):
+    bits, stations = 0, par.n_stations[par.pair_kind[pin]]
+    for j in range(stations):
         if pick(work.station[pin, j, FORCE], lane) > 0:
             bits |= 1 << j
     for face in range(par.face_pair.shape[0]):
         if par.face_pair[face] == pin and pick(work.face[face, FORCE], lane) > 0:
-            bits |= 1 << par.n_stations
+            bits |= 1 << stations
     return bits
 
 
@@ -89,7 +89,7 @@ def stuck(pin, lane, par, work):
     """Which stations of `pin` stick, as bits."""
     bits = 0
     if par.friction == 1:
-        for j in range(par.n_stations):
+        for j in range(par.n_stations[par.pair_kind[pin]]):
             rubbing = work.rubbing[pin, j]
             if pick(rubbing[SLOPE], lane) > STICKS * pick(rubbing[DAMPING], lane):
                 bits |= 1 << j

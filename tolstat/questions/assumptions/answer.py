@@ -103,7 +103,9 @@ def assumptions_on_page(view: View, asked: Asked) -> Answer:
 def _answer(view: View, standing: variations.Standing) -> Answer:
     """Table, notes and facts."""
     most = max(row["n"] for row in standing.rows)
-    each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
+    each = f"{text.several(standing.n, 'joint')} of each" + (
+        f", {most} of those left open" if most > standing.n else ""
+    )
     bases = {row["n"]: text.percent(row["drawn"]) for row in standing.rows}
     told = ", ".join(f"{drawn} of {n}" for n, drawn in bases.items())
     title = f"Share above a limit with other values, and its change; {each}"
@@ -167,8 +169,6 @@ def bars(standing: variations.Standing) -> Panel:
 
 FURTHER = 4
 """Largest number of joints of a variation whose first joints leave it open, in multiples of theirs."""
-MARGIN = 1.2
-"""Factor on the number of joints that would just decide a variation."""
 
 
 def simulate(
@@ -243,7 +243,7 @@ def simulate(
             run(further, number)
             run(variations.all_together(View(store)), n)
         if simulation.simulated:
-            done = f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s"
+            done = f"simulated {text.several(simulation.simulated, 'joint')} in {time.monotonic() - begin:.0f} s"
             more = f", {number} of {', '.join(variation.label for variation in further)}" if further else ""
             work.tell(f"{done}, {n} of each of {len(labels)} variations{more}")
         else:
@@ -255,7 +255,7 @@ def _further(view: View, accepted: float, n: int) -> tuple[list[variations.Varia
     """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
     standing = variations.evaluate(view, accepted)
     second = (1.0 + standing.confidence) / 2.0
-    needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
+    needed = {row["label"]: binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
     by_label = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
     return [by_label[label] for label in numbers], math.ceil(max(numbers.values(), default=n))

@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.analysis.binomial import needed
 from tolstat.analysis.rating_life import A1, FRETTING
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -125,8 +126,8 @@ def bearing_life(view: View) -> Answer:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         units = dict.fromkeys(list(contacts[0])[1:], "1")
         parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
-    facts: dict[str, Any] = {name: getattr(lives.bearing, name) for name in ("symbol", "critical_amplitude")}
-    facts |= {name: getattr(lives, name) for name in ("unrated", "short", "fretting", "load_error")}
+    names_of_facts = ("critical_amplitude", "unrated", "short", "fretting", "load_error")
+    facts: dict[str, Any] = {"symbol": lives.bearing.symbol} | {name: getattr(lives, name) for name in names_of_facts}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
 
@@ -182,7 +183,7 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     NotApplicable, StoreError, InputError
         See `lives.lives_of`.
     """
-    bearing = rating.bearing_of(view)
+    bearing = rating.bearings_of(view)[0]
     if bearing is None or bearing.required_life is None:
         return []
     lives = rating.lives_of(view)
@@ -193,8 +194,12 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
-    reason = lives.view.design.without_interval("share")
-    judged = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
+    level = lives.view.design.level(CONFIDENCE)
+
+    def deciding(share: float) -> float:
+        return needed(share, accepted, level)
+
+    judged = on_share("bearing life", what, row, ends, accepted, deciding, "", undecided)
     return [judged._replace(notes=tuple(_at_points(lives)))]
 
 
@@ -213,7 +218,10 @@ def _why_unrated(lives: rating.Lives, joints: str) -> str:
 
 
 def _angle(lives: rating.Lives, part: float = 1.0) -> str:
-    return f"{math.degrees(part * lives.bearing.critical_amplitude):.3g} deg"
+    """Part of the critical amplitude; where that of two joints differs, of each by its name."""
+    angles = [f"{math.degrees(part * bearing.critical_amplitude):.3g} deg" for bearing in lives.bearings]
+    named = [f"{angle} (joint{number})" for number, angle in enumerate(angles, 1)]
+    return angles[0] if len(set(angles)) == 1 else " and ".join(named)
 
 
 def _at_points(lives: rating.Lives) -> Iterator[str]:
@@ -244,12 +252,14 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
     """What the life means, what it leaves out, restrictions."""
     bearing = lives.bearing
     if lives.unrated < lives.valid:
-        factors = f"a_1 = {A1[bearing.reliability]:g}"
-        factors += "" if bearing.a_iso is None else f", a_ISO = {bearing.a_iso:g}"
+        ratings = " and ".join(dict.fromkeys(text.number(each.C / 1e3) for each in lives.bearings))
+        a_iso = {1.0 if each.a_iso is None else each.a_iso: each.a_iso for each in lives.bearings}
+        modified = "" if list(a_iso.values()) == [None] else f", a_ISO = {' and '.join(f'{a:g}' for a in a_iso)}"
+        factors = f"a_1 = {A1[bearing.reliability]:g}{modified}"
         all_pins = text.in_words(len(lives.pins))
         yield (
             f"{100.0 * bearing.reliability:g} % of equal joints reach their life {bearing.symbol} (C = "
-            f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; "
+            f"{ratings} kN, {factors}) at the joint's speed and misalignment; "
             f"all {all_pins}: until the first of the {all_pins} bearings fails, Weibull slope 9/8"
         )
     if len(lives.duty) > 1:
@@ -270,8 +280,6 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
-    if not lives.view.design.has_intervals:
-        yield shares.NO_INTERVALS
 
 
 def _draw(ax: Axes, lives: rating.Lives) -> None:
@@ -280,7 +288,7 @@ def _draw(ax: Axes, lives: rating.Lives) -> None:
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
-    drawing.curves(ax, x, {"": curve}, bands=int(lives.view.design.has_intervals), step="pre")
+    drawing.curves(ax, x, {"": curve}, bands=1, step="pre")
     style.share_axis(ax, floor)
     nominal = float(lives.nominal_hours[-1])
     ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]

@@ -17,7 +17,7 @@ from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display import text
 from tolstat.display.table import Rows
-from tolstat.joint import Bearing
+from tolstat.joint import Bearing, joints_of
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.shares import inapplicable, unusable, with_ends
 from tolstat.store import Reader, recorded
@@ -45,8 +45,8 @@ class Lives:
     ----------
     view : View
         The campaign.
-    bearing : Bearing
-        Section ``[bearing]`` of the joint.
+    bearings : tuple of Bearing
+        Section ``[bearing]`` of each joint that is simulated.
     duty : dict of str to float
         Share of the service time at each operating point; their sum is 1.
     pins : tuple of str
@@ -67,7 +67,7 @@ class Lives:
     """
 
     view: View
-    bearing: Bearing
+    bearings: tuple[Bearing, ...]
     duty: Mapping[str, float]
     pins: tuple[str, ...]
     loads: FloatArray
@@ -78,6 +78,24 @@ class Lives:
     fretting: Mapping[str, int]
     unrated: int
     load_error: float
+
+    @property
+    def bearing(self) -> Bearing:
+        """That of joint 1, which gives required life and reliability of all."""
+        return self.bearings[0]
+
+    @property
+    def critical_amplitude(self) -> float:
+        """Largest of the bearings, rad."""
+        return max(bearing.critical_amplitude for bearing in self.bearings)
+
+    def rating_of(self, place: str) -> float:
+        """Load rating C of the bearings of one of `places`, N; NaN of several with different ones."""
+        joints = [name.rstrip(".") for name in prefixes(self.view.mechanism)]
+        ratings = {
+            b.C for joint, b in zip(joints, self.bearings, strict=True) if place.startswith(joint) or place == SHAFT
+        }
+        return ratings.pop() if len(ratings) == 1 else np.nan
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -150,9 +168,9 @@ def lives_of(view: View) -> Lives:
         When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check()
-    bearing, duty, stores = _bearing(view), view.shares_of_time, [part.store for part in view.parts]
+    bearings, duty, stores = _bearings(view), view.shares_of_time, [part.store for part in view.parts]
     pins = kinds(view.mechanism)["contact"].places
-    load, hours, small = rated(bearing, duty, [turning_of(store) for store in stores])
+    load, hours, small = rated(bearings, duty, [turning_of(store) for store in stores])
     unrated = np.asarray(small[1].all(axis=0))
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
@@ -161,7 +179,7 @@ def lives_of(view: View) -> Lives:
     )
     return Lives(
         view=view,
-        bearing=bearing,
+        bearings=bearings,
         duty=dict(zip(view.points, duty.tolist(), strict=True)),
         pins=pins,
         loads=load[skip:],
@@ -186,14 +204,14 @@ def turning_of(store: Reader) -> dict[str, FloatArray]:
 
 
 def rated(
-    bearing: Bearing, duty: FloatArray, turning: Sequence[Mapping[str, FloatArray]]
+    bearings: Sequence[Bearing], duty: FloatArray, turning: Sequence[Mapping[str, FloatArray]]
 ) -> tuple[FloatArray, FloatArray, list[NDArray[np.bool_]]]:
     """Lives of joints by what they have at each operating point.
 
     Parameters
     ----------
-    bearing : Bearing
-        Bearing of each pin.
+    bearings : sequence of Bearing
+        Bearing of the pins of each joint.
     duty : ndarray, shape (points,)
         Share of the service time at each operating point.
     turning : sequence of mapping
@@ -211,8 +229,12 @@ def rated(
     loads = np.stack([each["equivalent_load"] for each in turning])
     speeds = np.abs([each["omega"] for each in turning])[:, :, None]
     joints = np.abs([each["alpha"] for each in turning])
-    swings = np.repeat(joints, loads.shape[2] // joints.shape[2], axis=2)
-    critical = bearing.critical_amplitude
+    pins = loads.shape[2] // joints.shape[2]
+    swings = np.repeat(joints, pins, axis=2)
+    critical, factor, C = (
+        np.repeat(np.array([getattr(bearing, name) for bearing in bearings], float), pins)
+        for name in ("critical_amplitude", "factor", "C")
+    )
     hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -220,28 +242,37 @@ def rated(
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        of_pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns
+        of_pins = factor * rating_life.basic_life(load, C) / turns
     small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
     of_pins[small[1].all(axis=0)] = np.nan
     of_joints = np.split(of_pins, joints.shape[2], axis=1) if joints.shape[2] > 1 else []
     return load, np.column_stack([of_pins, *map(rating_life.system_life, (*of_joints, of_pins))]), small
 
 
-def bearing_of(view: View) -> Bearing | None:
-    """Section ``[bearing]`` of the joint of a file, or of the study that is read in place of the one in it."""
-    return (view.study.joint if view.study_path else recorded.joint_of(view.store, 0)).bearing
+def bearings_of(view: View) -> list[Bearing | None]:
+    """Section ``[bearing]`` of the joints of a file, or of the study that is read in place of the one in it."""
+    study = view.study if view.study_path else None
+    joints = joints_of(study.joint, study.operation) if study else recorded.joints_at(view.store, 0)
+    return [joint.bearing for joint in joints]
 
 
-def _bearing(view: View) -> Bearing:
-    """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, again = bearing_of(view), "then repeat tolstat run: no joint is simulated again"
+def _bearings(view: View) -> tuple[Bearing, ...]:
+    """Section ``[bearing]`` of the joints of a file, with all that a life needs."""
+    sections = ("joint", "joint" if recorded.joint2_of(view.store) is None else "shaft.joint2")
+    return tuple(_complete(view, *both) for both in zip(bearings_of(view), sections, strict=False))
+
+
+def _complete(view: View, bearing: Bearing | None, section: str) -> Bearing:
+    """Bearing of the joint of a section of the study; refused without what a life needs."""
+    again = "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
-        remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
+        remedy = f"add the section [bearing] to the joint file or [{section}.bearing] to the study, {again}"
         raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
         incomplete = f"holds needle bearings without {', '.join(lacking)}, which a rating life needs"
         error = inapplicable if bearing.C is None and bearing.required_life is None else unusable
-        raise error(view, incomplete, f"add to [bearing] of the joint, {again}")
+        keys = " and ".join(f"{section}.bearing.{key}" for key in lacking)
+        raise error(view, incomplete, f"add {keys} to the study, or to [bearing] of the joint file, {again}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(kinds(view.mechanism)["contact"].places):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)
@@ -281,10 +312,11 @@ def life_rows(lives: Lives) -> Rows:
         return np.inf if rate <= 0.0 else 1.0 / rate  # no joint: -inf
 
     def rating(rate: float) -> float:
-        return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
+        return float(C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
 
     rows = []
     for rate in map(lives.rate, lives.places):
+        C = lives.rating_of(rate.name)
         for share in SHARES:
             q = rate.quantile(share, CONFIDENCE)
             row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}

@@ -19,7 +19,7 @@ from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import VALID
-from tolstat.display import drawing, style
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
 from tolstat.questions import shares
@@ -35,12 +35,10 @@ MOST_WIDE = 90.0
 """Width of an interval of a share, %, above which it says nothing."""
 SHOWN = 10
 """Number of errors shown for each load on the page."""
-JOINTS = 20_000
-"""Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
-MAX_JOINTS = sensitivity.MOST
+MAX_JOINTS = 20_000
 """Maximum number of joints (the first ones) for shares, and on either side of the tail: more add little, and
 a million joints with fifty errors do not fit into a gigabyte."""
-KINDS = ("first", "total", "direction", "size")
+KINDS = ("first", "direction", "size")
 TAIL = KINDS[-2:]
 
 Parts = Mapping[str, NamedTuple]
@@ -51,7 +49,6 @@ BARS = (
     "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
     "The rest up to 100 % comes from errors that act together."
 )
-GREY = "Grey: share that the error takes part in, alone or with others (bounds of the total index)."
 LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
 
 
@@ -64,11 +61,11 @@ class Indices(NamedTuple):
         ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares),
         ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
         ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive`` with ``_lower`` and
-        ``_upper``: sum of the first-order indices.
+        ``_upper``: sum of the first-order indices; whether errors are ``correlated``.
     rows : sequence of mapping
         One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
-        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``direction`` and ``size``; the
-        last two also with ``_p``, and NaN if too few joints are on either side of the level.
+        ``_lower`` and ``_upper``: ``first``, ``direction`` and ``size``; the last two also with ``_p``, and NaN if too
+        few joints are on either side of the level.
     """
 
     facts: Mapping[str, Any]
@@ -94,9 +91,9 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     loads in it: until the order of the lines is settled, the time is up, or each change has --most joints. All else
     stays as drawn. To go on, run the same command again.
 
-    Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
-    total Sobol' indices), and the probability that a joint above the limit (without a limit: above the 90 % quantile)
-    has a larger, or a more extreme, error than a joint below. Where the file holds load histories, tells which error
+    Gives for each error: the share of the load's variance that it explains alone (first-order Sobol' index), and the
+    probability that a joint above the limit (without a limit: above the 90 % quantile) has a larger, or a more extreme,
+    error than a joint below. Where the file holds load histories, tells which error
     scatters the load most at its peak over the input angle.
 
     Example: tolstat causes iso2768_f.h5 --by cross1.F
@@ -164,15 +161,14 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
     with asked.noting("causes are left out"):
         view.check()
         loads = view.loads(view.leading)
-        jobs = [partial(indices, view, load.name, load.long_tailed, JOINTS) for load in loads]
+        jobs = [partial(indices, view, load.name, load.long_tailed, MAX_JOINTS) for load in loads]
         tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
         for load, job, of_errors in zip(loads, jobs, tried, strict=True):
             with asked.noting(f"no causes of {load.name}"):
                 each.append(of_errors or job())  # which raises what it raised before
     if not each:
         raise NotApplicable
-    introduction = [BARS, GREY * any(_has_narrow_bounds(of_errors.rows) for of_errors in each)]
-    introduction.append(LOGARITHMS * any(of_errors.facts["logarithm"] for of_errors in each))
+    introduction = [BARS, LOGARITHMS * any(of_errors.facts["logarithm"] for of_errors in each)]
     introduction.append("" if each[0].with_intervals else "No intervals: the samples are not independent.")
     parts: list[Part] = [Sentence(" ".join(filter(None, introduction)), "lead"), Panels(list(map(_tornado, each)))]
     with asked.noting("nothing over the input angle"):
@@ -192,12 +188,6 @@ def _tried(job: Callable[[], Indices]) -> Indices | None:
     return None
 
 
-def _has_narrow_bounds(rows: Rows) -> bool:
-    """Whether the bounds of the total indices tell something: median width of the first `SHOWN` below 0.5."""
-    widths = [row["total_upper"] - row["total_lower"] for row in rows[:SHOWN]]
-    return bool(widths) and bool(np.median(widths) < 0.5)  # false without bounds (NaN)
-
-
 def _table(name: str, of_errors: Indices, shown: int) -> Table:
     """Table of all errors; people see the `shown` with the largest shares, and those with an effect on the tail.
 
@@ -207,7 +197,6 @@ def _table(name: str, of_errors: Indices, shown: int) -> Table:
     columns = [
         Column("error", shares.word("error")),
         shares.estimated("alone, %", "first", ends=(0.0, 1.0)),
-        Column("in all, %", shares.between("total"), shown=_has_narrow_bounds, rank=3),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
@@ -241,19 +230,18 @@ def _notes(of_errors: Indices, command: str, shown: int) -> list[str]:
         alone += f", of which the {number} not shown {share} % (without effect they scatter about 0 %)"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
     level = "at least one limit" if facts["load"] == ANY_LIMIT else f"{facts['level']:.5g} {unit}".rstrip()
-    tail = f"; tail: {facts['above']} joints above {level}"
+    tail = f"; tail: {text.several(facts['above'], 'joint')} above {level}"
     notes = [
-        f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
-        f"standard deviation {std}",
+        f"{facts['load']}: {text.several(facts['joints'], 'joint')}, {facts['without_load']} without a valid load left "
+        f"out; standard deviation {std}",
         f"{alone}{tail}",
     ]
     if (used := facts["used"]) < facts["joints"]:
         notes.append(f"shares are from the first {used} joints, the tail from at most as many on either side")
-    if all(math.isnan(row["total"]) for row in rows):
-        notes.append("errors are correlated: shares overlap, and shares in all are not given")
-    elif not _has_narrow_bounds(rows):
-        remedy = f"; {command} gives them" if command else ""
-        notes.append(f"no shares in all: given joints bound them too widely{remedy}")
+    if facts["correlated"]:
+        notes.append("errors are correlated: shares overlap")
+    elif command:
+        notes.append(f"shares in all, with interactions: {command}")
     return notes if of_errors.with_intervals else [*notes, shares.NO_INTERVALS]
 
 
@@ -262,16 +250,9 @@ def _tornado(of_errors: Indices) -> Panel:
 
     def draw(ax: Axes) -> None:
         y = np.arange(len(rows))
-        first, low, high, total_low, total_high = (
-            100.0 * np.array([row[key] for row in rows])
-            for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
-        )
+        first, low, high = (100.0 * np.array([row[f"first{end}"] for row in rows]) for end in ENDS)
         bar: Any = {"height": 0.5, "color": style.COLOURS[0], "zorder": 2, "label": "alone (first order), 95 %"}
         ax.barh(y, first.clip(min=0.0), **bar)
-        if _has_narrow_bounds(rows):
-            bar = {"height": 0.74, "color": drawing.GREY, "alpha": 0.45, "zorder": 1}
-            label = "in all (bounds of the total index)"
-            ax.barh(y, total_high - total_low, left=total_low, label=label, **bar)
         if np.isfinite(low).any():
             ax.hlines(y, low, high, color=style.INK, lw=1.2, zorder=3)
         ax.set_xlim(0.0, None)
@@ -321,6 +302,7 @@ def indices(view: View, by: str, logarithm: bool = False, joints: int | None = N
     facts |= {"used": min(valid.size, MAX_JOINTS), "without_load": sum(load.unresolved)}
     facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
     facts |= shares.with_ends("additive", first.additive)
+    facts["correlated"] = bool(view.study.copula.names)
     columns: dict[str, Any] = {"error": names}
     for kind in KINDS:
         estimates = parts[kind]._asdict() if kind in parts else {}
@@ -342,10 +324,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], P
     x = np.column_stack([components[name] for name in names])
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
     parts: dict[str, NamedTuple] = {}
-    if study.copula.names:
-        first = sensitivity.first_order(x, response, iid=independent)
-    else:
-        first, parts["total"] = sensitivity.first_and_total(x, response, iid=independent)
+    first = sensitivity.first_order(x, response, iid=independent)
     above = values > shares.tail_level(load)
     if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))

@@ -17,6 +17,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.loads import ANY_LIMIT
+from tolstat.display import text
 from tolstat.display.options import Costs, Load, Opt
 from tolstat.questions.causes import shares
 from tolstat.questions.shares import Simulation, check_sample, own_joints
@@ -140,7 +141,7 @@ class _Looks:
             is_settled = self._look(n, confidence)
         more_of = "a larger --most" if n >= self._most else "a longer --budget"
         order = "settled" if is_settled else f"not settled: {more_of} goes on"
-        done = f"simulated {self._simulation.simulated} joints in {self._budget - self._left:.0f} s"
+        done = f"simulated {text.several(self._simulation.simulated, 'joint')} in {self._budget - self._left:.0f} s"
         return f"{done}, {'up to ' if self._is_cut else ''}{n} of each change; order of lines {order}"
 
     def _look(self, n: int, confidence: float, decisive: bool = False) -> bool:

@@ -12,7 +12,7 @@ from tolstat import sampling
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import ranks
 from tolstat.analysis.sensitivity import FEWEST
-from tolstat.common.columns import DRAWN, result_columns
+from tolstat.common.columns import result_columns
 from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import FloatArray, load_of, loads_of
 from tolstat.common.strict import did_you_mean
@@ -163,7 +163,7 @@ def _raising(
     """
     all_samples, values, _ = _with_values(view, name)
     used = np.sort(all_samples)[:MOST]
-    if view.method not in DRAWN or used.size < FEWEST or not scores:
+    if view.method != "random" or used.size < FEWEST or not scores:
         return [[] for _ in samples]
     names, every = list(scores), _scores(view, used)
     z, here = (np.column_stack([columns[key] for key in names]) for columns in (every, scores))

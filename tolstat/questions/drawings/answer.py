@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -98,9 +98,9 @@ def _joints(view: View, marked: Collection[str], load: str) -> dict[str, tuple[P
 
     By what stands before the names of its parts, see `mechanism.prefixes`.
     """
-    point, joint = view.point_of(load) if load else view.points[0], recorded.joint_of(view.store, 0)
+    point, each = view.point_of(load) if load else view.points[0], recorded.joints_at(view.store, 0)
     alphas, drawn = view.at(point).store.operation.alphas, {}
-    for before, alpha in zip(prefixes(view.mechanism), alphas, strict=True):
+    for before, alpha, joint in zip(prefixes(view.mechanism), alphas, each, strict=True):
         own = [name.removeprefix(before) for name in marked if name.startswith(before)]
         front, side = _named(views.views(joint, alpha, own), before)
         drawn[before] = front, replace(side, title=f"{side.title}, at {point}") if point else side
@@ -153,16 +153,22 @@ def _worst(view: View) -> list[Panel]:
         loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, words in loads.items():
-        joint, row = recorded.joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
+        slot, row = int(view.slots(sample)), int(view.rows(sample))
+        joint, joint2 = recorded.joint_of(view.store, slot), recorded.joint2_of(view.store)
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
-        panels += _errors_of(joint, errors, title, f"drawn-{row}")
+        panels += _errors_of(_each(joint, joint2, errors), errors, title, f"drawn-{row}")
     return panels
 
 
-def _errors_of(joint: joints.Joint, errors: NDArray[np.void], title: str, key: str) -> list[Panel]:
-    """Drawing of the errors of each Cardan joint of one mechanism."""
+def _each(joint: joints.Joint, joint2: joints.Joint | None, errors: NDArray[np.void]) -> dict[str, joints.Joint]:
+    """Each Cardan joint of one mechanism, by what stands before the names of its parts."""
+    return dict(zip(views.joints_in(errors.dtype), (joint, joint2 or joint), strict=False))
+
+
+def _errors_of(each: Mapping[str, joints.Joint], errors: NDArray[np.void], title: str, key: str) -> list[Panel]:
+    """Drawing of the errors of each Cardan joint, see `_each`."""
     panels = []
-    for before in views.joints_in(errors.dtype):
+    for before, joint in each.items():
         name, own = before.rstrip("."), views.errors_in(joint, errors, before)
         of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
         panels.append(views.errors_of(joint, own, f"{of}{title}", f"{key}{suffix}"))
@@ -268,9 +274,10 @@ def draw_joint(joint: joints.Joint, at: float | joints.Operation, title: str = "
     if isinstance(at, joints.OperationOfLinkage):
         return drawing.sheet([_linkage(joint, at)], title or at.linkage.description, [PLAIN])
     if isinstance(at, joints.OperationOfShaft):
-        each = [views.views(joint, alpha) for alpha in at.alphas]
-        sides = [_named(panels, f"joint{number}.")[1] for number, panels in enumerate(each, 1)]
-        panels = [shaft.picture(joint, at), each[0][0], *sides]
+        each = [views.views(own, alpha) for own, alpha in zip(joints.joints_of(joint, at), at.alphas, strict=True)]
+        named = [_named(panels, f"joint{number}.") for number, panels in enumerate(each, 1)]
+        fronts = [front for front, _ in named] if at.joint2 else [each[0][0]]
+        panels = [shaft.picture(joint, at), *fronts, *(side for _, side in named)]
     else:
         panels = list(views.views(joint, at.alpha if isinstance(at, joints.Operation) else at))
     return drawing.sheet(panels, title or joint.description or "Cardan joint", NOTES, columns)
@@ -304,8 +311,10 @@ def draw_errors(joint: joints.Joint) -> Figure:
     return drawing.sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
 
 
-def draw_row(joint: joints.Joint, errors: NDArray[np.void], title: str = "") -> Figure:
-    """Draw the errors of one joint, enlarged together with its clearances.
+def draw_row(
+    joint: joints.Joint, errors: NDArray[np.void], title: str = "", joint2: joints.Joint | None = None
+) -> Figure:
+    """Draw the errors of one joint or drive shaft, enlarged together with its clearances.
 
     Parameters
     ----------
@@ -315,16 +324,18 @@ def draw_row(joint: joints.Joint, errors: NDArray[np.void], title: str = "") -> 
         Errors of the joint, such as ``store.errors(slice(17, 18))``.
     title : str
         Headline.
+    joint2 : Joint, optional
+        Joint 2 of a drive shaft; `joint` if it is left out.
     """
-    panels = _errors_of(joint, errors, "Seen along z and along t of each pin", "row")
+    panels = _errors_of(_each(joint, joint2, errors), errors, "Seen along z and along t of each pin", "row")
     return drawing.sheet(panels, title or "Errors of one joint", ROW)
 
 
-def numbers(joint: joints.Joint, errors: NDArray[np.void]) -> Rows:
-    """Errors of each pin and hole of one joint, see `views.numbers`; names as in `errors`."""
+def numbers(joint: joints.Joint, errors: NDArray[np.void], joint2: joints.Joint | None = None) -> Rows:
+    """Errors of each pin and hole, see `views.numbers`; names as in `errors`; parameters as of `draw_row`."""
     rows = list[Row]()
-    for before in views.joints_in(errors.dtype):
-        own = views.numbers(joint, views.errors_in(joint, errors, before))
+    for before, each in _each(joint, joint2, errors).items():
+        own = views.numbers(each, views.errors_in(each, errors, before))
         rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
     return rows
 

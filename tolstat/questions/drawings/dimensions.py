@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isnan
 
 import numpy as np
@@ -34,7 +34,7 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
     Parameters
     ----------
     joint : Joint
-        The nominal joint.
+        The nominal joint; of a drive shaft joint 1.
     points : sequence of Point
         Its operating points.
     """
@@ -42,6 +42,11 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
         lines = [*_of_linkage(points[0].operation.linkage), *_of_pins(joint), *_of_points(points), *_of_parts(joint)]
         return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in lines]
     lines = [*_of_joint(joint), *_of_points(points), *_of_parts(joint)]
+    if joint2 := points[0].operation.joint2:
+        own = [line for line in _of_parts(joint) if line[0] not in ("shaft.output.bearings", "shaft.unbalance")]
+        other = [line for line in _of_parts(joint2) if line[0] != "shaft.input.bearings"]
+        lines = [*_before("joint1.", [*_of_joint(joint), *own]), *_before("joint2.", [*_of_joint(joint2), *other])]
+        lines += _of_points(points)
     shafts = [point.operation for point in points if isinstance(point.operation, OperationOfShaft)]
     if shafts:
         names = _at(points)
@@ -49,6 +54,10 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
         waves = ", ".join(f"{100.0 * round(second_order(joint, operation), 6):.3g}" for operation in shafts)
         lines.append(("output speed", f"{waves} %", f"amplitude of its second order by the angles alone{names}"))
     return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in lines]
+
+
+def _before(prefix: str, lines: Iterable[Line]) -> list[Line]:
+    return [(f"{prefix}{name}", value, meaning) for name, value, meaning in lines]
 
 
 def second_order(joint: Joint, operation: OperationOfShaft) -> float:

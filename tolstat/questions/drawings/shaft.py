@@ -9,7 +9,7 @@ import numpy as np
 from tolstat.display.answer import Axes, Panel
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, DASHES, FAINT, INK
-from tolstat.joint import Joint, OperationOfShaft
+from tolstat.joint import Joint, OperationOfShaft, joints_of
 from tolstat.questions.drawings.views import Array, Look
 
 LEFT, RIGHT, SCALE, TITLE, LEAST, FORKS = 0.62, 0.1, 0.5, 0.26, 0.75, 1.25
@@ -50,9 +50,8 @@ def points_of(joint: Joint, operation: OperationOfShaft) -> tuple[Array, Array]:
     behind = of_tube @ (np.sin(second) * np.cos(shaft.plane), np.sin(second) * np.sin(shaft.plane), np.cos(second))
     centres = np.array([np.zeros(3), of_tube @ (0.0, 0.0, 1e3 * shaft.length)])
     ends, bearings = [], []
-    for own, centre, away in zip(
-        (joint.shaft.input, joint.shaft.output), centres, ((0.0, 0.0, -1.0), behind), strict=True
-    ):
+    one, two = joints_of(joint, operation)
+    for own, centre, away in zip((one.shaft.input, two.shaft.output), centres, ((0.0, 0.0, -1.0), behind), strict=True):
         places = [] if own is None else [1e3 * place for place in own.bearings]
         ends.append(centre + 1.1 * max(places, default=200.0 * shaft.length) * np.array(away))
         bearings += [centre + place * np.array(away) for place in places]

@@ -17,7 +17,7 @@ from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
-from tolstat.joint import Joint, Operation, mechanism_of, nominal_errors, perturb, perturbation
+from tolstat.joint import Joint, Operation, bodies, mechanism_of, nominal_errors, perturb
 
 Array = NDArray[np.float64]
 Place = Array | tuple[float, float]
@@ -95,9 +95,10 @@ def no_errors(joint: Joint) -> NDArray[np.void]:
 
 def errors_in(joint: Joint, errors: NDArray[np.void], before: str) -> NDArray[np.void]:
     """Errors of a Cardan joint of one mechanism, (1,) table ERROR as of `no_errors`; `before` as of `joints_in`."""
-    of_joint = no_errors(joint)
+    of_joint, every = no_errors(joint), errors.dtype.names or ()
     for name in of_joint.dtype.names or ():
-        of_joint[name] = errors[f"{before}{name}" if f"{before}{name}" in (errors.dtype.names or ()) else name]
+        if found := next((own for own in (f"{before}{name}", name) if own in every), ""):
+            of_joint[name] = errors[found]
     return of_joint
 
 
@@ -114,7 +115,7 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     par = perturb(joint, AT_REST, errors)[0]
     pairs_of_joint = []
     for i, (pair, number) in enumerate(zip(CARDAN.pairs, HOLE_OF_PIN, strict=True)):
-        t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[number - 1]
+        t, u = bodies.PIN_TRIADS[i], bodies.ARM_TRIADS[number - 1]
         thick = joint.contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
         pin = Feature(pair.pin, thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
@@ -215,7 +216,7 @@ def _front(ax: Axes, joint: Joint, marked: Collection[str]) -> None:
     _frame(ax, 1.4 * end, -1.66 * end, 1.37 * end)
     _pins(ax, joint, range(4), FRONT, "front")
     _centre_line(ax, -1.08 * end * X, 1.08 * end * X)
-    for k, e in enumerate(perturbation.PIN_TRIADS[:, 0] @ FRONT.T, 1):
+    for k, e in enumerate(bodies.PIN_TRIADS[:, 0] @ FRONT.T, 1):
         offset = (12.0 if r_b < 0.35 * end else -12.0) * e
         _bushing(ax, r_b * e, f"cross{k}")
         _label(ax, r_b * e, f"cross{k}", offset, rotation=90 * (k > 2), bbox=ON_CROSS)
@@ -238,7 +239,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
     _strip(ax, (-root * X, root * X), (-root, root), CROSS)
     _centre_line(ax, -1.08 * end * Y, 1.08 * end * Y)
     for k in pins:
-        e, arm, name = view @ perturbation.PIN_TRIADS[k, 0], HOLE_OF_PIN[k] - 1, f"{key}.pin{k + 1}"
+        e, arm, name = view @ bodies.PIN_TRIADS[k, 0], HOLE_OF_PIN[k] - 1, f"{key}.pin{k + 1}"
         upright, colour = abs(e[1]) > 0.5, INPUT if arm < 2 else OUTPUT
         _strip(ax, (min(root, low) * e, low * e), (-neck, neck), CROSS)
         _strip(ax, (low * e, end * e), (-pin, pin), CROSS, gid=name)
@@ -248,7 +249,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
         middle, beside = joint.cross.R * e, eye * (X if upright else Y)
         _label(ax, middle, f"pin {k + 1}", rotation=90 * (not upright), bbox=ON_CROSS)
         _label(ax, middle + beside, f"arm {arm + 1}", (22.0, 0.0) if upright else (0.0, 7.0))
-        _triad(ax, 1.08 * end * e, perturbation.PIN_TRIADS[k], view, name)
+        _triad(ax, 1.08 * end * e, bodies.PIN_TRIADS[k], view, name)
 
 
 def _side(ax: Axes, joint: Joint, alpha: float, marked: Collection[str]) -> None:

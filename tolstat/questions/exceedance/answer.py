@@ -6,18 +6,18 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
+from tolstat.analysis.design import SAMPLE
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table
 from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row, by_share, has, has_unresolved
+from tolstat.display.table import Column, Row, alike, by_share, has, has_unresolved
 from tolstat.display.verdict import WORDS
-from tolstat.joint.perturbation import one_force
 from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
-from tolstat.store.recorded import joint_of
+from tolstat.store.recorded import joints_at
 from tolstat.store.view import View
 
 SAMPLED, TOTAL = (shares.shares(f"{kind}lower", f"{kind}upper") for kind in ("", "total_"))
@@ -77,8 +77,7 @@ def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
         When the joints are those of a sweep, or listed.
     """
     if view.method in ("sweep", "cases"):
-        remedy = 'give the result file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise shares.inapplicable(view, "its joints are no sample of a production", remedy)
+        raise shares.inapplicable(view, "its joints are no sample of a production", SAMPLE)
     parts = [*limit_tables(view, accepted), *quantile_tables(view), *_pictures(view), Sentence(note(view))]
     return Answer("exceedance", TITLE, parts)
 
@@ -134,9 +133,7 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
     if any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for other, row in zip(others, rows, strict=True)):
         title = "What makes the shares above limits uncertain, in per cent of the joints"
-        parts.append(
-            Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate", view.mechanism))
-        )
+        parts.append(Table("uncertainty", title, BUDGET, rows, seen=alike(rows, BUDGET)))
     return Answer("limits", "Each limit", parts)
 
 
@@ -166,7 +163,7 @@ def quantiles(view: View) -> Answer:
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise shares.inapplicable(view, "has no sample of valid loads", "simulate more joints")
     title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
-    title = title if view.design.has_intervals else "Quantiles"
+    title = title if view.design.is_sample else "Quantiles"
     return Answer("quantiles", "Quantiles", [_quantiles(view, title, True)])
 
 
@@ -177,14 +174,13 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     rows, is_judged = of.limit_rows(view), not math.isnan(accepted)
     if is_judged:
         rows = [{**row, "verdict": WORDS[of.verdict(row, accepted)]} for row in rows]
-    seen = one_force(rows, "level", "estimate", view.mechanism)
+    seen = alike(rows, LIMITS)
     verdicts = [of.verdict(row, accepted) for row in seen] if is_judged else ()
     tables = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
         columns = [LIMITS[0], LIMITS[2], *(Column(point, shares.share(point)) for point in view.points)]
-        seen = one_force(points, "level", view.points[0], view.mechanism)
-        tables.append(Table("at_points", title, columns, points, seen=seen))
+        tables.append(Table("at_points", title, columns, points, seen=alike(points, columns)))
     return tables
 
 
@@ -238,7 +234,7 @@ def _beyond(view: View) -> str:
     forces = [view.load(name).nominal for name in names if name in view.bushing_loads]
     if not forces or len(view.points) > 1:
         return ""
-    torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R
+    torque, radius = abs(view.store.operation.torque), joints_at(view.store, 0)[-1].cross.R
     if not max(forces) < torque / (2.0 * radius):
         return ""
     at_middle = text.value(torque / (2.0 * radius), "N")
@@ -247,9 +243,9 @@ def _beyond(view: View) -> str:
 
 def _how(view: View, accepted: float) -> Iterator[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.design.has_intervals:
+    if not view.design.is_sample:
         yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
-        yield text.sentence(view.design.without_interval("share"))
+        yield "The joints are no sample of a production: a share has no interval."
         return
     yield (
         f"Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import simultaneous
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common.loads import LoadPanel, load_of, load_panels, panels
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
@@ -58,7 +58,7 @@ def _panel(view: View, panel: LoadPanel) -> Panel:
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), panel.unit)
         x = f"x: largest {panel.quantity} over the revolution [{unit or '1'}]"
         ax.set(xlabel=x, ylabel="share of joints above x")
-        if view.design.has_intervals:
+        if view.design.is_sample:
             end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
             look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
             ax.axhline(end, **look, label="upper end where none exceeds x")
@@ -172,7 +172,7 @@ def leading_panel(view: View, name: str) -> Panel:
             return
         high, floor = _draw(ax, view, {0: load}, [other for other in view.loads(others) if other.valid.size])
         if view.design.independent:
-            table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
+            table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size, load.design.level(CONFIDENCE))
             for end in (table["bound_upper"] + half, table["bound_lower"] - half):
                 line = _step(ax, table, end, floor, color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
                 drawing.switched(line, "curve-band")

@@ -146,7 +146,7 @@ def readings(view: View) -> dict[str, Any]:
         equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
         ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
-    curves, is_known = {}, view.design.has_intervals
+    curves, is_known = {}, view.design.is_sample
     ends = ("lower", "upper", "outer_lower", "outer_upper") if is_known else ("bound_lower", "bound_upper")
     for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:

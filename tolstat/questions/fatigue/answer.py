@@ -10,7 +10,9 @@ from typing import Annotated
 import numpy as np
 
 from tolstat.analysis import binomial, prediction, strength
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.channels import signals_of, unit_of
+from tolstat.common.counts import POWER
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.mechanism import Mechanism
@@ -22,6 +24,7 @@ from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.questions.fatigue import counting, loads, parts
 from tolstat.questions.fatigue.loads import SHARES, channels, load_cycles
+from tolstat.questions.shares import NO_INTERVALS
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, StressPoint
@@ -226,14 +229,16 @@ def _verdict(about: str, what: str, row: Row, joints: counting.Joints, accepted:
     def joints_needed(end: float) -> float:
         if "count" in row:
             return binomial.needed(end, accepted)
-        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
+        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small; nine
+        # in ten means are nearer than 1.28 standard errors, of which half an interval has 1.96
         distance = row["upper"] - share if share < accepted else share - row["lower"]
+        distance *= 1.0 + float(binomial.half_width(2.0 * POWER - 1.0) / binomial.half_width(CONFIDENCE))
         return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
 
     lost = math.isnan(share) or (without and without / row["n"] >= 0.5 * (row["upper"] - row["lower"]))
     undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
     what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
-    reason = joints.design.without_interval("mean")
+    reason = "" if joints.design.independent else "the joints depend on each other: a mean has no interval"
     judged = verdict.on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
     first = f"{about}: of the first {row['n']} of {joints.total} joints"
     return judged._replace(notes=(first,) if joints.total > joints.status.size else ())
@@ -285,7 +290,7 @@ def _notes_on_parts(stressed: counting.Counted, rows: Rows) -> Iterator[str]:
     if rows[-1]["point"] == counting.ANY:
         yield f"{counting.ANY}: the joint fails with its first part; strengths of two points are independent"
     if not stressed.design.independent:
-        yield "no intervals: they hold for independent samples only"
+        yield NO_INTERVALS
     if stressed.apart > MAX_APART:
         yield _apart(stressed)
 
@@ -298,8 +303,6 @@ def _notes_on_loads(loading: counting.Counted, rows: Rows) -> Iterator[str]:
     yield from loading.duty_in_words
     if loading.apart > MAX_APART:
         yield _apart(loading)
-    if not loading.design.has_intervals:
-        yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)
     if lacking > MAX_LACKING:
         yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
@@ -357,8 +360,7 @@ def _draw_spectrum(ax: Axes, loading: counting.Counted, channel: str) -> None:
         low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
         curves[f"{100 * share:g} % of the joints stay below"] = estimate, low, high
     ax.step(x, nominal, where="pre", color=style.INK, lw=1, label="nominal joint")
-    has_bands = loading.design.has_intervals
-    drawing.curves(ax, x, curves, bands=len(curves) if has_bands else 0, step="pre")
+    drawing.curves(ax, x, curves, bands=len(curves), step="pre")
     shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
     ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))
     ax.set_xlim(x[0], 1.05 * max(shown if shown > x[0] else x[-1], 2.0 * x[0]))

@@ -126,8 +126,8 @@ def failures(
     """
     done = stressed.status != Status.PENDING
     n_failed, n_without = int(np.isin(stressed.status, FAILED).sum()), int((done & ~stressed.valid).sum())
-    has_interval = stressed.design.independent
-    return strength.failures(_chances(points, lives)[done], n_failed, n_without - n_failed, confidence, has_interval)
+    level, has_interval = stressed.design.level(confidence), stressed.design.independent
+    return strength.failures(_chances(points, lives)[done], n_failed, n_without - n_failed, level, has_interval)
 
 
 def _chances(points: Sequence[Evaluated], lives: float = 1.0) -> FloatArray:

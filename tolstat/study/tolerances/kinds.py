@@ -17,6 +17,7 @@ from tolstat.common import strict
 from tolstat.common.errors import gather, input_error
 from tolstat.common.strict import refuse
 from tolstat.common.tables import FACTORS
+from tolstat.joint.operation import having
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus
 from tolstat.study.selection import Entry, Reading, toleranced_units
 from tolstat.study.tolerances import distributions as tolerance
@@ -326,12 +327,12 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
     read: dict[int, Toleranced] = {}
-    reach = math.nan if file.joint is None else file.joint.cross.R
     for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
         item, names = table[number]
         models = []
         with gather(file.faults):
             for name in names:
+                reach = math.nan if file.joint is None else having(name, file.joint, file.joint2).cross.R
                 site = Site(name, units[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
                 if _is_position([name]):
                     direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
@@ -349,7 +350,7 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     axes: dict[str, Axis] = {}
     if file.joint is not None:
         with gather(file.faults):
-            axes = axes_of(entries, reach, file.place)
+            axes = axes_of(entries, file.place)
     # those with faults stand for what they would draw, so that others do not seem to lack them
     drawn = [quantity for i, (_, names) in enumerate(table) for quantity in (read[i].names if i in read else names)]
     return Tolerances(entries, axes, list(dict.fromkeys(drawn)))

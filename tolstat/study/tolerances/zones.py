@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
@@ -250,15 +250,13 @@ def _columns(feature: str, kind: str, parts: str = "tz") -> tuple[str, ...]:
     return tuple(f"{member}.{kind}_{part}" for member in members(feature) for part in parts)
 
 
-def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str, Axis]:
+def axes_of(entries: Sequence[Toleranced], place: str) -> dict[str, Axis]:
     """Axes that have zones, from the entries of ``[tolerances]``.
 
     Parameters
     ----------
     entries : sequence of Toleranced
         All entries of a study.
-    reach : float
-        Distance of the features' middles from the joint's centre, m.
     place : str
         File name shown in faults.
 
@@ -268,11 +266,13 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
         For zones of one axis that contradict each other.
     """
     zones: dict[str, dict[str, tuple[ToleranceEntry, str]]] = {}
+    reach: dict[str, float] = {}
     bonus: dict[str, Bonus | None] = {}
     for entry in entries:
         for site, model in entry.models:
             if axes.is_zone(site.name):
                 feature, _, key = site.name.rpartition(".")
+                reach[feature] = site.reach
                 zones.setdefault(feature, {})[key] = (model, dotted(("tolerances", entry.pattern)))
                 if isinstance(model, PositionEntry):
                     bonus[feature] = model.bonus(site)
@@ -287,21 +287,21 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                     model, where = of_axis[key]
                     room = position.band if position.bounded else math.inf
                     faults += _contradictions(model, position, f"{place}: {where}")
-        axis_of[name] = Axis(name, over, room, reach if is_pair(name) else math.nan, bonus.get(name))
+        axis_of[name] = Axis(name, over, room, reach[name] if is_pair(name) else math.nan, bonus.get(name))
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     return axis_of
 
 
-def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[str, str, str]]:
+def short_axes(entries: Sequence[Toleranced], length_of: Callable[[str], float]) -> Iterator[tuple[str, str, str]]:
     """Common axes that are toleranced over less than the distance of their two features.
 
     Parameters
     ----------
     entries : sequence of Toleranced
         All entries of a study.
-    length : float
-        Length of each pin and hole, m.
+    length_of : callable
+        Length of a pin or hole, m, of a name that is about it.
 
     Yields
     ------
@@ -319,7 +319,7 @@ def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[s
                 remedy = (
                     "for a common axis over is the length from face to face with the joint's centre in the middle, "
                 )
-                remedy += f"here 2 (R + z/2) = {units.shown(apart + length, 'm')}"
+                remedy += f"here 2 (R + z/2) = {units.shown(apart + length_of(site.name), 'm')}"
                 yield f"tolerances.{entry.pattern}.over", found, remedy
                 break
 

@@ -24,18 +24,20 @@ def linkage():
 
 
 @pytest.mark.parametrize("name", ["hinge", "fourbar", "cranks", SPATIAL])
-def test_pins_lie_in_their_eyes_at_all_angles(name: str) -> None:
-    """The series of 24 orders closes the loops to a few nanometres at most."""
-    mechanism = linkages.mechanism_of(name)
+def test_members_move_as_closed_forms_say(name: str) -> None:
+    mechanism, case = linkages.mechanism_of(name), linkages.cases()[name]
     par, members = linkages.parameters(name, mechanism)[0], [member.name for member in mechanism.members]
     for theta in np.linspace(0, 6, 7):
         attitudes, origins = naive.placed(theta, par, mechanism)
-        for pair in linkages.cases()[name]["pairs"].values():
-            of = [(members.index(pair[side]["member"]), pair[side]) for side in ("pin", "eye")]
-            points = [origins[i] + attitudes[i] @ side["point_m"] for i, side in of]
-            axes = [attitudes[i] @ side["e"] for i, side in of]
-            np.testing.assert_allclose(points[0], points[1], atol=2e-9)
-            np.testing.assert_allclose(axes[0], axes[1], atol=2e-9)
+        for pair in case["pairs"].values():
+            places = []
+            for side in (pair["pin"], pair["eye"]):
+                i, member = members.index(side["member"]), side["member"]
+                axes, origin = linkages.pose(case, member, theta)
+                np.testing.assert_allclose(attitudes[i] @ linkages.turned(name, member), axes, atol=1e-9)
+                places.append(origins[i] + attitudes[i] @ linkages.in_member(name, side))
+                np.testing.assert_allclose(places[-1], origin + axes @ side["point_m"], atol=1e-9)
+            np.testing.assert_allclose(*places, atol=1e-9)
 
 
 @pytest.mark.parametrize("phase", [0.3, 3.0])
@@ -82,11 +84,13 @@ def test_loads_at_the_states_of_the_reference(name: str) -> None:
     """What the ideal motion misses changes loads by the contacts' stiffness times some 1e-10 m."""
     mechanism = linkages.mechanism_of(name)
     par, work, of = linkages.parameters(name, mechanism)[0], make_work(mechanism), linkages.reference(name)
-    lumps = [list(of["bodies"]).index(lump.name) for lump in mechanism.lumps]
-    bushings = [i for i, bushing in enumerate(mechanism.bushings) if bushing.group != "turn"]
-    order = [list(of["names"]).index(mechanism.bushings[i].name) for i in bushings]
+    bushings = [i for i, bushing in enumerate(mechanism.bushings) if bushing.group != "drive"]
+    lumps = [list(of["bodies"]).index(linkages.name_in_reference(lump.name)) for lump in mechanism.lumps]
+    order = [list(of["names"]).index(linkages.name_in_reference(mechanism.bushings[i].name)) for i in bushings]
+    axes = np.array([linkages.turned(name, lump.member) for lump in mechanism.lumps])
     for theta, states, loads, thrust in zip(of["theta"], of["q"], of["loads"], of["thrust"], strict=True):
-        q, v = states[lumps, :6].ravel(), states[lumps, 6:].ravel()
+        here = np.einsum("lij,lkj->lki", axes, states[lumps].reshape(-1, 4, 3))
+        q, v = here[:, :2].ravel(), here[:, 2:].ravel()
         dynamics.forces(theta / par.omega, q, v, par, work)
         np.testing.assert_allclose(work.load[bushings], loads[order], atol=1e-3 * np.abs(of["loads"]).max())
         np.testing.assert_allclose(work.face[:, FORCE], thrust.ravel(), atol=1e-3 * np.abs(of["loads"]).max())

@@ -154,7 +154,7 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
     par, z = perturb(cirelli, OPERATION, errors)[0], cirelli.contact.z
-    panel = views.errors_of(cirelli, errors, "", "row")
+    (panel,) = views.errors_of(cirelli, OPERATION, errors, "", "row")
     (factor,) = map(float, re.findall(r"enlarged (\S+) times", panel.description))
     found, _ = drawn(panel)
     for i, number in enumerate(HOLE_OF_PIN):
@@ -175,7 +175,7 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    panel = views.errors_of(fitting, nominal_errors(1, CARDAN), "", "row")
+    (panel,) = views.errors_of(fitting, OPERATION, nominal_errors(1, CARDAN), "", "row")
     assert "enlarged 1 times" in panel.description
     assert drawn(panel)
 
@@ -249,7 +249,7 @@ def test_labels_of_errors_are_inside_and_apart(over, random_errors):
         errors[name.replace("__", ".")] = value
     for panel in (
         views.kinds_of_errors(joint),
-        views.errors_of(joint, errors, "", "row"),
+        *views.errors_of(joint, OPERATION, errors, "", "row"),
     ):
         _, figure = drawn(panel)
         renderer = figure.canvas.get_renderer()
@@ -338,4 +338,4 @@ def test_figures_of_the_package(cirelli):
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
     assert tolstat.draw_errors is answer.draw_errors
-    assert len(tolstat.draw_row(cirelli, nominal_errors(1, CARDAN), "one").axes) == 1
+    assert len(tolstat.draw_row(cirelli, OPERATION, nominal_errors(1, CARDAN), "one").axes) == 1

@@ -149,5 +149,5 @@ def test_equivalent_loads_are_means_over_the_revolutions_of_the_duty_cycle(path:
 
 def test_a_joint_with_faces_is_drawn(path: Path) -> None:
     with ResultFile.open(path) as store:
-        joint, errors = store.view().study.joint, store.errors()[3:4]
-    assert tolstat.draw_row(joint, errors, "one").axes
+        study, errors = store.view().study, store.errors()[3:4]
+    assert tolstat.draw_row(study.joint, study.operation, errors, "one").axes

@@ -235,9 +235,9 @@ def test_a_joint_2_of_its_own_is_drawn_and_told(of_study):
     assert not {"cross.R", "joint1.shaft.output.bearings", "joint2.shaft.input.bearings"} & values.keys()
     errors = nominal_errors(1, joint.mechanism_of(of_study.joint, operation))
     errors["joint2.pin1.diameter"] = 1e-4
-    told = {row["feature"]: row for row in drawings.numbers(of_study.joint, errors, held)}
+    told = {row["feature"]: row for row in drawings.errors_in_numbers(of_study.joint, operation, errors)}
     assert list(told["joint2.pin1"].values())[-1] == pytest.approx(1e3 * (held.contact.clearance - 5e-5))
-    assert len(drawings.draw_row(of_study.joint, errors, joint2=held).axes) >= 2
+    assert len(drawings.draw_row(of_study.joint, operation, errors).axes) >= 2
     titles = [axes.get_title(loc="left") for axes in drawings.draw_joint(of_study.joint, operation).axes]
     assert len(titles) == 5
     assert [title.partition(":")[0] for title in titles if "The cross" in title] == ["joint1", "joint2"]

@@ -278,9 +278,9 @@ def show(
     if errors:
         figure, rows = library.drawings.draw_errors(drawn.joint), library.drawings.meanings()
     elif drawn.errors is not None:
-        joint2 = drawn.points[0].operation.joint2
-        figure = library.drawings.draw_row(drawn.joint, drawn.errors, drawn.title, joint2)
-        rows = library.drawings.numbers(drawn.joint, drawn.errors, joint2)
+        operation = drawn.points[0].operation
+        figure = library.drawings.draw_row(drawn.joint, operation, drawn.errors, drawn.title)
+        rows = library.drawings.errors_in_numbers(drawn.joint, operation, drawn.errors)
     else:
         figure = library.drawings.draw_joint(drawn.joint, drawn.points[0].operation, drawn.title, columns)
         rows = library.dimensions.dimensions(drawn.joint, drawn.points)

@@ -121,8 +121,8 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     held = {}
     for i, (pin, hole, _, kind) in enumerate(mechanism.pairs):
         held[pin] = own[kind.removesuffix("bearing")]
-        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, pin, triads[pin])
-        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, triads[hole])
+        params["pin_point"][:, i], params["pin_axis"][:, i] = axis(errors, pin, triads[pin])
+        params["hole_point"][:, i], params["hole_axis"][:, i] = axis(errors, hole, triads[hole])
         deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"] + slack[i])
         params["clearance"][:, i] = _clearance(held[pin].contact, *deviations)
     for i, face in enumerate(mechanism.faces):
@@ -163,7 +163,7 @@ def _of_pairs(joint: Joint) -> dict[str, Any]:
     }
 
 
-def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
+def axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     """Shift and direction of a feature's axis in its frame, both of shape (n, 3).
 
     The direction is exp(epsilon x) e, epsilon = tilt_t t + tilt_z z, as a finite rotation; as epsilon is

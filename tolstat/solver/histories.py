@@ -18,7 +18,7 @@ from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, Signal, components, load_histories
 from tolstat.common.fields import HistorySpec
 from tolstat.common.load_kinds import CONTACTS, spans
-from tolstat.common.mechanism import Mechanism
+from tolstat.common.mechanism import Mechanism, carried
 from tolstat.common.tables import Options
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
@@ -79,11 +79,13 @@ def extracted(
     samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec], mechanism: Mechanism = CARDAN
 ) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
+    shafts = samples["shafts"][:, carried(mechanism)]
     if histories == "full":
         fields = {name: samples["loads"][:, span] for name, span in spans(mechanism).items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
+        fields[SHAFT_LOADS] = shafts
         return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    fields = {BUSHING_LOADS: samples["components"], SHAFT_LOADS: samples["shafts"]}
+    fields = {BUSHING_LOADS: samples["components"], SHAFT_LOADS: shafts}
     loads = {name: np.ascontiguousarray(values) for name, values in fields.items()}
     sample = cycles(loads, mechanism) if "cycles" in histories else {}
     if "harmonics" in histories:

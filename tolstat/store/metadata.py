@@ -21,7 +21,6 @@ from pydantic import BaseModel, ConfigDict
 
 import tolstat
 from tolstat.common.cardan import MECHANISMS
-from tolstat.common.errors import input_error
 from tolstat.common.fields import HistorySpec
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import Options, Variant, to_names
@@ -102,15 +101,12 @@ class Metadata(BaseModel):
 
         Raises
         ------
-        InputError
-            When there is no such mechanism.
+        KeyError, ValueError, InputError
+            When there is no such mechanism, or the linkage is damaged.
         """
         linkage = next(iter(self.points.values())).get("linkage") if self.points else None
         if linkage:
             return linked.named(self.mechanism, linkage)
-        if self.mechanism not in MECHANISMS:
-            found = f"is {self.mechanism!r}, which this tolstat does not know"
-            raise input_error("mechanism", found, "use a newer tolstat")
         return MECHANISMS[self.mechanism]
 
 

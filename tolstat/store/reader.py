@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import DESIGN_COLUMNS, SUBSET, Column, drawn_columns, error_columns, kept_columns
 from tolstat.common.counts import Counts, Session
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import DESIGN, Status, tables
 from tolstat.common.wording import row_of
 from tolstat.joint import Operation
@@ -97,7 +97,11 @@ class Reader:
 
     def _describe(self, document: metadata.Metadata) -> None:
         self.metadata = document
-        self.mechanism = document.simulated
+        try:
+            self.mechanism = document.simulated
+        except (InputError, KeyError, ValueError) as error:
+            found = f"has mechanism {document.mechanism!r}, which this tolstat does not know"
+            raise store_error(self.path, found, "use a newer tolstat") from error
         self.study_name, self.study_text = document.study_name, document.study
         self.joint, self.limits = document.joint, document.limits
         self.identity, self.options, self.fidelity = document.identity, document.options, document.fidelity

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from tolstat.common.mechanism import Mechanism, prefixes
 from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Row, Rows, Sentence
+from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
 from tolstat.questions.drawings import shaft, views
 from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
@@ -47,9 +47,7 @@ NOTES = (
 """How to read the drawing of a joint."""
 ERRORS = ("Dashed: without error. e points away from the centre of the joint; every pin and hole has its own e, t, z.",)
 """How to read the drawing of the kinds of errors."""
-ROW = (
-    "Diameters and contact to scale. Cross and forks in their ideal place: they give way where pin and hole overlap.",
-)
+ROW = ("Diameters and contact to scale. Members stand in their ideal place: they give way where pin and hole overlap.",)
 """How to read the drawing of the errors of one joint."""
 
 
@@ -128,16 +126,15 @@ def drawings(view: View) -> Answer:
         whole; the kinds of its errors; errors of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name, view.mechanism).place.name for name in view.leading} - {""})
-    if not view.mechanism.cardan:
-        panel = _linkage(recorded.joint_of(view.store, 0), view.at(view.points[0]).store.operation, marked)
-        return Answer("drawings", "The mechanism, drawn", [Panels([panel]), Sentence(PLAIN)])
-    kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
-    drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
-    operation = view.at(view.points[0]).store.operation
-    whole: list[Part] = []
+    joint, operation = recorded.joint_of(view.store, 0), view.at(view.points[0]).store.operation
+    kinds, parts = views.kinds_of_errors(joint), list[Part]()
     if isinstance(operation, joints.OperationOfShaft):
-        whole = [Panels([shaft.picture(recorded.joint_of(view.store, 0), operation)])]
-    parts: list[Part] = [*whole, Panels([*drawn, kinds]), Sentence(LEGEND)]
+        parts.append(Panels([shaft.picture(joint, operation)]))
+    if view.mechanism.cardan:
+        drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
+        parts += [Panels([*drawn, kinds]), Sentence(LEGEND)]
+    else:
+        parts += [Panels([_linkage(joint, operation, marked), kinds]), Sentence(PLAIN)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
     return Answer("drawings", "The joint and its errors, drawn", parts)
@@ -154,24 +151,9 @@ def _worst(view: View) -> list[Panel]:
     panels = []
     for sample, words in loads.items():
         slot, row = int(view.slots(sample)), int(view.rows(sample))
-        joint, joint2 = recorded.joint_of(view.store, slot), recorded.joint2_of(view.store)
+        joint, operation = recorded.joint_of(view.store, slot), view.at(view.points[0]).store.operation
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
-        panels += _errors_of(_each(joint, joint2, errors), errors, title, f"drawn-{row}")
-    return panels
-
-
-def _each(joint: joints.Joint, joint2: joints.Joint | None, errors: NDArray[np.void]) -> dict[str, joints.Joint]:
-    """Each Cardan joint of one mechanism, by what stands before the names of its parts."""
-    return dict(zip(views.joints_in(errors.dtype), (joint, joint2 or joint), strict=False))
-
-
-def _errors_of(each: Mapping[str, joints.Joint], errors: NDArray[np.void], title: str, key: str) -> list[Panel]:
-    """Drawing of the errors of each Cardan joint, see `_each`."""
-    panels = []
-    for before, joint in each.items():
-        name, own = before.rstrip("."), views.errors_in(joint, errors, before)
-        of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
-        panels.append(views.errors_of(joint, own, f"{of}{title}", f"{key}{suffix}"))
+        panels += views.errors_of(joint, operation, errors, title, f"drawn-{row}")
     return panels
 
 
@@ -311,33 +293,25 @@ def draw_errors(joint: joints.Joint) -> Figure:
     return drawing.sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
 
 
-def draw_row(
-    joint: joints.Joint, errors: NDArray[np.void], title: str = "", joint2: joints.Joint | None = None
-) -> Figure:
-    """Draw the errors of one joint or drive shaft, enlarged together with its clearances.
+def draw_row(joint: joints.Joint, operation: joints.Operation, errors: NDArray[np.void], title: str = "") -> Figure:
+    """Draw the errors of one joint, drive shaft or linkage, enlarged together with its clearances.
 
     Parameters
     ----------
-    joint : Joint
-        The nominal joint.
+    joint, operation : Joint, Operation
+        What is simulated, such as ``study.joint``, ``study.operation``.
     errors : ndarray, shape (1,), dtype ERROR
-        Errors of the joint, such as ``store.errors(slice(17, 18))``.
+        Its errors, such as ``store.errors(slice(17, 18))``.
     title : str
         Headline.
-    joint2 : Joint, optional
-        Joint 2 of a drive shaft; `joint` if it is left out.
     """
-    panels = _errors_of(_each(joint, joint2, errors), errors, "Seen along z and along t of each pin", "row")
+    panels = views.errors_of(joint, operation, errors, "Seen along z and along t of each pin", "row")
     return drawing.sheet(panels, title or "Errors of one joint", ROW)
 
 
-def numbers(joint: joints.Joint, errors: NDArray[np.void], joint2: joints.Joint | None = None) -> Rows:
-    """Errors of each pin and hole, see `views.numbers`; names as in `errors`; parameters as of `draw_row`."""
-    rows = list[Row]()
-    for before, each in _each(joint, joint2, errors).items():
-        own = views.numbers(each, views.errors_in(each, errors, before))
-        rows += [{**row, "feature": f"{before}{row['feature']}"} for row in own]
-    return rows
+def errors_in_numbers(joint: joints.Joint, operation: joints.Operation, errors: NDArray[np.void]) -> Rows:
+    """Errors of each pin and hole, see `views.numbers`; parameters as of `draw_row`."""
+    return views.numbers(joint, operation, errors)
 
 
 def meanings() -> Rows:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
-from tolstat.joint import Joint, Operation, bodies, mechanism_of, nominal_errors, perturb
+from tolstat.joint import Joint, Operation, bodies, mechanism_of, nominal_errors, perturb, perturbation
+from tolstat.joint.operation import having
 
 Array = NDArray[np.float64]
 Place = Array | tuple[float, float]
@@ -82,63 +84,46 @@ Cell = tuple[str, str, Array, dict[str, tuple[Pair, Look]]]
 """Drawing of a pin in its hole: a headline, words, direction of view, pairs by name and how they look."""
 
 
-def joints_in(table: np.dtype[np.void]) -> list[str]:
-    """What stands before the names of the parts of each Cardan joint of a mechanism, ``"joint1."``; `table`: ERROR."""
-    first = f"{CARDAN.pairs[0].pin}.diameter"
-    return [name.removesuffix(first) for name in table.names or () if name.endswith(first)]
-
-
-def no_errors(joint: Joint) -> NDArray[np.void]:
-    """A joint without errors, (1,) table ERROR of the joint by itself."""
-    return nominal_errors(1, mechanism_of(joint, AT_REST))
-
-
-def errors_in(joint: Joint, errors: NDArray[np.void], before: str) -> NDArray[np.void]:
-    """Errors of a Cardan joint of one mechanism, (1,) table ERROR as of `no_errors`; `before` as of `joints_in`."""
-    of_joint, every = no_errors(joint), errors.dtype.names or ()
-    for name in of_joint.dtype.names or ():
-        if found := next((own for own in (f"{before}{name}", name) if own in every), ""):
-            of_joint[name] = errors[found]
-    return of_joint
-
-
-def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
-    """Pins 1 to 4 with the holes that they turn in, of one joint; an error of the clearance widens the hole.
+def pairs(joint: Joint, operation: Operation, errors: NDArray[np.void]) -> dict[str, list[Pair]]:
+    """Pins with the holes that they turn in, by name of the joint; an error of the clearance widens the hole.
 
     Parameters
     ----------
-    joint : Joint
-        The nominal joint.
-    errors : ndarray, shape (1,), dtype ERROR as of `no_errors`
+    joint, operation : Joint, Operation
+        What is simulated.
+    errors : ndarray, shape (1,), dtype ERROR
         Its errors.
     """
-    par = perturb(joint, AT_REST, errors)[0]
-    pairs_of_joint = []
-    for i, (pair, number) in enumerate(zip(CARDAN.pairs, HOLE_OF_PIN, strict=True)):
-        t, u = bodies.PIN_TRIADS[i], bodies.ARM_TRIADS[number - 1]
-        thick = joint.contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
-        pin = Feature(pair.pin, thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
+    par, found = perturb(joint, operation, errors)[0], dict[str, list[Pair]]()
+    for i, pair in enumerate(mechanism_of(joint, operation).pairs):
+        thick = having(pair.pin, joint, operation.joint2).contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
         wide = thick + 2.0 * float(par["clearance"][i])
-        pairs_of_joint.append((pin, Feature(pair.hole, wide, u @ par["hole_point"][i], u @ par["hole_axis"][i])))
-    return pairs_of_joint
+        both = _feature(errors, pair.pin, thick), _feature(errors, pair.hole, wide)
+        found.setdefault(pair.kind.removesuffix("bearing").rstrip("."), []).append(both)
+    return found
+
+
+def _feature(errors: NDArray[np.void], name: str, diameter: float) -> Feature:
+    point, axis = perturbation.axis(errors, name, np.eye(3))
+    return Feature(name, diameter, point[0], axis[0])
 
 
 def positive(joint: Joint, kind: str) -> Pair:
     """Pin 1 and hole 4, both with a positive error of one kind, large enough to be drawn as it is."""
-    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), no_errors(joint)
+    unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), nominal_errors(1, mechanism_of(joint, AT_REST))
     sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
     for name in CARDAN.pairs[0][:2]:
         errors[f"{name}.{kind}"] = sizes[kind.partition("_")[0]]
-    return pairs(joint, errors)[0]
+    return pairs(joint, AT_REST, errors)[""][0]
 
 
-def numbers(joint: Joint, errors: NDArray[np.void]) -> Rows:
-    """Errors of a joint, one row for each pin and hole, with the radial clearance of the pair.
+def numbers(joint: Joint, operation: Operation, errors: NDArray[np.void]) -> Rows:
+    """Errors, one row for each pin and hole, with the radial clearance of the pair; parameters as of `pairs`.
 
     e, t, z: offsets; ⌀: deviation of the diameter. Lengths in mm, tilts in degrees, to four decimals.
     """
     rows = []
-    for pin, hole in pairs(joint, errors):
+    for pin, hole in chain.from_iterable(pairs(joint, operation, errors).values()):
         for name in (pin.name, hole.name):
             sizes = [(np.degrees(1.0) if "tilt" in kind else 1e3) * errors[f"{name}.{kind}"][0] for kind in MEANINGS]
             cells = (round(float(x), 4) for x in (*sizes, 5e2 * (hole.diameter - pin.diameter)))
@@ -174,7 +159,8 @@ def kinds_of_errors(joint: Joint) -> Panel:
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     solid: Look = {"edgecolor": COLOURS[0]}
     dashed: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none"}
-    cells, ideal = list[Cell](), pairs(joint, no_errors(joint))[0]
+    none = nominal_errors(1, mechanism_of(joint, AT_REST))
+    cells, ideal = list[Cell](), pairs(joint, AT_REST, none)[""][0]
     for kind, meaning in MEANINGS.items():
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
         both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}
@@ -183,13 +169,23 @@ def kinds_of_errors(joint: Joint) -> Panel:
     return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 3 * HEIGHT), bare=True)
 
 
-def errors_of(joint: Joint, errors: NDArray[np.void], title: str, key: str) -> Panel:
-    """Errors of one joint, enlarged: pins 1 to 4 in their holes, while cross and forks are in their ideal place.
+def errors_of(joint: Joint, operation: Operation, errors: NDArray[np.void], title: str, key: str) -> list[Panel]:
+    """Drawing of the errors of each joint, see `_errors_of`; parameters as of `pairs`."""
+    panels = []
+    for name, both in pairs(joint, operation, errors).items():
+        of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
+        own = having(f"{name}.", joint, operation.joint2)
+        panels.append(_errors_of(own, both, f"{of}{title}", f"{key}{suffix}"))
+    return panels
+
+
+def _errors_of(joint: Joint, both: Sequence[Pair], title: str, key: str) -> Panel:
+    """Errors of one joint, enlarged: pins in their holes, while the members that carry them are in their ideal place.
 
     Along a pin, the shift of its axis is enlarged: where pin and hole overlap, they would do so in this place. The
-    largest error or clearance is drawn as a sixth to a quarter of the pin's size. `errors` as in `pairs`.
+    largest error or clearance is drawn as a sixth to a quarter of the pin's size.
     """
-    both, z = pairs(joint, errors), joint.contact.z
+    z = joint.contact.z
     moved = [abs(feature.ends(z) - feature.ends(z, 0.0)).max() for pair in both for feature in pair]
     largest = max(*moved, *(0.5 * abs(hole.diameter - pin.diameter) for pin, hole in both))
     factor = float(f"{0.08 * (joint.contact.D_P + z) / largest:.0e}") if largest > 0.0 else 1.0
@@ -201,7 +197,7 @@ def errors_of(joint: Joint, errors: NDArray[np.void], title: str, key: str) -> P
             cells.append((head, gap, view, {f"along_{way}": (pair, look)}))
     description = f"Pins in their holes, errors and clearance enlarged {factor:g} times."
     draw = partial(_cells, joint=joint, cells=cells, factor=factor)
-    return Panel(key, title, description, draw, (WIDTH, 4 * HEIGHT), bare=True)
+    return Panel(key, title, description, draw, (WIDTH, len(both) * HEIGHT), bare=True)
 
 
 def _sketched(joint: Joint) -> tuple[float, float, float]:

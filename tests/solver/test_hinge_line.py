@@ -1,0 +1,72 @@
+"""A flap on three hinges of the study against a rigid beam on springs with gaps, solved by enumeration."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tolstat import joint as joints
+from tolstat import study
+from tolstat.common.tables import Options, Status
+from tolstat.solver.simulation import simulate_rows
+
+pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
+Array = NDArray[np.float64]
+STUDY = Path(__file__).parents[2] / "studies" / "hinge_line.toml"
+HEIGHTS = np.array([-0.3, 0.0, 0.3])
+"""Places of the hinges along the axis of the flap, m."""
+
+
+def beam(off: Array, gap: float, k: float, moment: float) -> Array:
+    """Forces of the hinges, N, on a rigid beam that a moment turns; `off`: of the hinges from a line, m.
+
+    The linear complementarity problem by enumeration: each hinge bears on one side, on the other, or not at all.
+    """
+    for sides in product((-1.0, 0.0, 1.0), repeat=3):
+        side, bears = np.array(sides), np.array(sides) != 0.0
+        across = np.stack([np.ones(3), HEIGHTS])[:, bears]
+        if bears.sum() < 2:
+            continue
+        # force k (side gap - off - a - b height) of each hinge that bears; their sum is zero, their moment is given
+        a, b = np.linalg.solve(k * across @ across.T, k * across @ (side * gap - off)[bears] - [0.0, moment])
+        apart = off + a + b * HEIGHTS
+        force = np.where(bears, k * (side * gap - apart), 0.0)
+        if np.all(np.where(bears, apart * side >= gap, abs(apart) <= gap)):
+            return force
+    raise AssertionError("one combination is in equilibrium")
+
+
+def of_study(tmp_path: Path) -> study.Study:
+    """The study without friction, slow enough for statics, with hinges that do not resist a tilt."""
+    text = STUDY.read_text(encoding="utf-8")
+    for old, new in (("mu = 0.12, mu_along = 0.12", "mu = 0.0, mu_along = 0.0"), ('z = "20 mm"', 'z = "0.5 mm"')):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "hinge_line.toml"
+    path.write_text(text.replace('speed = "15 rpm"', 'speed = "1 rpm"'), encoding="utf-8")
+    return study.load(path)
+
+
+def test_hinges_carry_what_a_beam_on_springs_with_gaps_does(tmp_path: Path) -> None:
+    """The lower hinge carries the weight, too; two hinges alone carry W b/h each."""
+    one = of_study(tmp_path)
+    joint, flap = one.joint, one.operation.linkage.member["flap"]
+    off = np.array([-0.2, -0.06, 0.0, 0.02, 0.07, 0.15]) * 1e-3
+    errors = joints.nominal_errors(len(off), one.mechanism)
+    errors["middle_eye.offset_z"] = off  # along the line from the hinges to the mass centre
+    params = joints.perturb(joint, one.operation, errors)
+    result = simulate_rows(params, Options(), mechanism=one.mechanism).results
+    assert np.isin(result["status"], [Status.OK, Status.STATIONARY]).all()
+    k = 1.0 / sum(1.0 / k for k in (joint.k_cross[1], joint.contact.k2u, joint.k_fork[2]))
+    moment, weight = -9.81 * flap.mass * flap.centre[0], 9.81 * (flap.mass + 3 * joint.arm.mass)
+    pins = [i for i, bushing in enumerate(one.mechanism.bushings) if bushing.name.endswith("_pin")]
+    for row, at in zip(result, off, strict=True):
+        across = beam(np.array([0.0, at, 0.0]), joint.contact.clearance, k, moment)
+        expected = np.hypot(across, [weight, 0.0, 0.0])
+        np.testing.assert_allclose(row["F_max"][pins], expected, rtol=0, atol=1e-3 * expected.max())
+    alone = np.abs(beam(np.zeros(3), joint.contact.clearance, k, moment))
+    np.testing.assert_allclose(alone, [-moment / 0.6, 0.0, -moment / 0.6], atol=1e-9)

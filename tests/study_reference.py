@@ -44,7 +44,7 @@ def key_table(properties: Mapping[str, Any], required: Iterable[str] = ()) -> st
         if own.get("type") == "object" and "x-table" not in own:
             continue
         needed = "needed" if key in required else f"`{json.dumps(own['default'])}`" if "default" in own else ""
-        example = f"`{key} = {toml(own['examples'][0])}`"
+        example = f"`{key} = {toml(own['examples'][0])}`" if "examples" in own else ""
         unit = {"1": "", "error": "of the error"}.get(of_unit(own), of_unit(own))
         lines.append(f"| `{key}` | {kind(own)} | {unit} | {needed} | {own['description']} | {example} |")
     return "\n".join(lines)

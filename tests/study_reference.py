@@ -13,6 +13,7 @@ from tolstat.common.loads import loads_of, units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
+from tolstat.joint.linkage import Drive, MemberOf, PairOf
 from tolstat.joint.model import GIVEN_BY
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.shaft import SplineOfTubes, Tube
@@ -22,7 +23,7 @@ from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
 from tolstat.study.file import OF_CASE
 from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
-from tolstat.study.points import PointEntry
+from tolstat.study.points import DrivenPoint, PointEntry
 from tolstat.study.schema import of_model
 from tolstat.study.selection import toleranced_units
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
@@ -43,7 +44,7 @@ def key_table(properties: Mapping[str, Any], required: Iterable[str] = ()) -> st
         if own.get("type") == "object" and "x-table" not in own:
             continue
         needed = "needed" if key in required else f"`{json.dumps(own['default'])}`" if "default" in own else ""
-        example = f"`{key} = {toml(own['examples'][0])}`"
+        example = f"`{key} = {toml(own['examples'][0])}`" if "examples" in own else ""
         unit = {"1": "", "error": "of the error"}.get(of_unit(own), of_unit(own))
         lines.append(f"| `{key}` | {kind(own)} | {unit} | {needed} | {own['description']} | {example} |")
     return "\n".join(lines)
@@ -226,6 +227,10 @@ def tables() -> dict[str, str]:
         "fit": FitEntry,
         "tube": Tube,
         "spline": SplineOfTubes,
+        "member": MemberOf,
+        "pair": PairOf,
+        "drive": Drive,
+        "driven point": DrivenPoint,
     }
     return (
         found

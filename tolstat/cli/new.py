@@ -1,4 +1,4 @@
-"""``tolstat new``: studies to begin with, of a joint, of a drive shaft, or from a measured signal."""
+"""``tolstat new``: studies to begin with, of a joint, a drive shaft, another mechanism, or from a measured signal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import sys
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tolstat.cli._library import np, spectra, starter, studies, text
 from tolstat.cli._shared import echo, say
@@ -30,6 +30,7 @@ def new(
     base: Annotated[Path | None, Opt("STUDY")] = None,
     shaft: bool = False,
     size: Annotated[str | None, Opt("SIZE")] = None,
+    kind: Annotated[Literal["hinge", "cranks", "fourbar"] | None, Opt("KIND")] = None,
 ) -> None:
     """Write a study with comments that runs as it stands.
 
@@ -43,6 +44,9 @@ def new(
 
     With --shaft, the study is of a drive shaft: two joints, two tubes and a spline. With --size, too, a joint file is
     written of a cross in the table that comes with tolstat, with its source and what is computed or assumed.
+
+    With --kind, the study is of another over-constrained mechanism: a flap on three hinges, a plate on three parallel
+    cranks, or a planar four-bar linkage.
 
     Example: tolstat new shaft --joint own
 
@@ -64,6 +68,8 @@ def new(
         Study of a drive shaft of two joints.
     size : str, optional
         Size of the crosses of a drive shaft, cup x length over two cups in mm: "27 x 81.8"; another one lists all.
+    kind : str, optional
+        Mechanism of the study: hinge, cranks or fourbar; default: a Cardan joint.
     """
     path = name if name.suffix.lower() == ".toml" else name.with_name(f"{name.name}.toml")
     faults: list[Fault] = []
@@ -77,6 +83,10 @@ def new(
         given = " and ".join(f"--{name}" for name, value in (("joint", joint), ("signal", signal)) if value is not None)
         remedy = "name the joint or the signal in the study that it writes"
         faults.append(Fault("--shaft", f"cannot be used together with {given}", remedy))
+    others = {"shaft": shaft, "joint": joint is not None, "signal": signal is not None}
+    if kind is not None and any(others.values()):
+        given = " and ".join(f"--{name}" for name, there in others.items() if there)
+        faults.append(Fault("--kind", f"cannot be used together with {given}", "remove one of the two"))
     if size is not None and not shaft:
         faults.append(Fault("--size", "is the size of the crosses of a drive shaft", "give --shaft, too"))
     if signal is not None and path.exists():
@@ -84,7 +94,9 @@ def new(
     with gather(faults):
         check_target(path)
     raise_all(faults)
-    if shaft:
+    if kind is not None:
+        files = starter.write_linkage(path, kind)
+    elif shaft:
         files = starter.write_shaft(path, size)
     elif signal is None:
         files = starter.write(path, joint or "cirelli2021")

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -23,7 +24,8 @@ from tolstat.common.loads import units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
-from tolstat.joint import DriveShaft, Joint, Operation
+from tolstat.joint import DriveShaft, Joint, Linkage, Operation
+from tolstat.joint.linked import linkage_mechanism
 from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone
@@ -32,7 +34,7 @@ from tolstat.study.fatigue import LineEntry, Settings, StressPointEntry
 from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
-from tolstat.study.points import PointEntry
+from tolstat.study.points import DrivenPoint, DrivenPointEntry, PointEntry
 from tolstat.study.selection import halves, joints, toleranced_units
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
@@ -47,9 +49,13 @@ WILD = r"[^.]*[*?\[][^.]*"
 FEATURE = rf"(?:[^.]*\.)?{WILD}|{WILD}\.[^.]*"
 """What stands before the last dot of a name, with a wildcard; a joint may stand before it."""
 JOINTS = joints(SHAFT)
-WHOLE = tuple(MECHANISMS[named(base, PARTS)] for base in (CARDAN, SPLINED))
-"""Mechanisms with all parts, which have the names of all others."""
 """What stands before the names of the features of one of several joints."""
+WHOLE = tuple(MECHANISMS[named(base, PARTS)] for base in (CARDAN, SPLINED))
+"""Mechanisms with all parts, which have the names of all others but linkages."""
+NAME = "<name>"
+"""Pair or member of a linkage, which the user names, in the names of its errors and loads: ``<name>_pin.offset_t``."""
+LINKAGES = tuple(Path(__file__).parent / "templates" / f"{kind}.toml" for kind in ("fourbar", "hinge"))
+"""Studies of linkages that have the names of all others: a driven member is held, or has a pair in the ground."""
 REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
 
@@ -121,19 +127,33 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
         names_of.setdefault(json.dumps(schema), []).append(name)
     wild = {"anyOf": _different(schema for name, schema in entries.items() if not is_zone(name))}
     nested: dict[str, Schema] = {}
+    patterns: dict[str, Schema] = {}
+    others: Schema | bool = False
     for feature, keys in features.items():
+        inner = keys.get("") or _closed(keys, {f"^{WILD}$": wild} if wild["anyOf"] else None)
         joint, _, own = feature.rpartition(".")
+        if NAME in feature:
+            patterns |= {f"^{_escaped(feature)}$": inner} if feature != NAME else {}
+            others = inner if feature == NAME else others
+            continue
         around = nested.setdefault(joint, _closed({}, {r"[.*?\[]": wild}))["properties"] if joint else nested
-        around[own] = keys.get("") or _closed(keys, {f"^{WILD}$": wild} if wild["anyOf"] else None)
-    patterns = {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
-    patterns |= {rf"^(?:{'|'.join(map(re.escape, features))}|{FEATURE})\.{WILD}{end}$": wild}
-    return _closed(nested, patterns) | {"description": description}
+        around[own] = inner
+    patterns |= {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
+    patterns |= {rf"^(?:{'|'.join(map(_escaped, features))}|{FEATURE})\.{WILD}{end}$": wild}
+    return _closed(nested, patterns, others) | {"description": description}
 
 
-def _closed(properties: Mapping[str, Schema], patterns: Mapping[str, Schema] | None = None) -> Schema:
-    """Schema of a table without other keys."""
+def _closed(
+    properties: Mapping[str, Schema], patterns: Mapping[str, Schema] | None = None, others: Schema | bool = False
+) -> Schema:
+    """Schema of a table without other keys, or whose other keys have a schema."""
     by_pattern = {"patternProperties": dict(patterns)} if patterns else {}
-    return {"type": "object", "properties": dict(properties), **by_pattern, "additionalProperties": False}
+    return {"type": "object", "properties": dict(properties), **by_pattern, "additionalProperties": others}
+
+
+def _escaped(feature: str) -> str:
+    """Regular expression of a feature."""
+    return re.escape(feature).replace(NAME, "[^.]+")
 
 
 def _different(schemas: Iterable[Schema]) -> list[Schema]:
@@ -148,14 +168,20 @@ def _keys(names: Iterable[str]) -> str:
         halves_of.setdefault(feature, []).append(re.escape(name[len(feature) :]))
     features_of: dict[str, list[str]] = {}
     for feature, keys in halves_of.items():
-        features_of.setdefault("|".join(keys), []).append(re.escape(feature))
+        features_of.setdefault("|".join(keys), []).append(_escaped(feature))
     wild = {ends: FEATURE if ends else WILD for ends in features_of}
     return "|".join(f"(?:{'|'.join(features)}|{wild[ends]})(?:{ends})" for ends, features in features_of.items())
 
 
 def _every(units_of: Callable[[Mechanism], Mapping[str, Any]]) -> dict[str, Any]:
-    """Names in all mechanisms, with their units."""
-    return {name: unit for mechanism in WHOLE for name, unit in units_of(mechanism).items()}
+    """Names in all mechanisms, with their units; in those of linkages `NAME` is what the user names."""
+    found = {name: unit for mechanism in WHOLE for name, unit in units_of(mechanism).items()}
+    for path in LINKAGES:
+        linkage = Linkage.model_validate(strict.read_toml(path)["mechanism"])
+        own = re.compile(rf"^(?:{'|'.join([*linkage.pair, linkage.drive.member])})(?=[_.])")
+        names = units_of(linkage_mechanism(linkage, PARTS))
+        found |= {own.sub(NAME, name): unit for name, unit in names.items() if own.match(name)}
+    return found
 
 
 def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:
@@ -182,11 +208,11 @@ def sections() -> dict[str, Schema]:
     toleranced = _entries("tolerance", drawn)
     toleranced |= {name: {"x-table": key} for name in drawn if (key := halves(name)[1]) in ZONE_KINDS}
     scatter = _table("How errors scatter, by name or pattern.", toleranced)
-    points = [of_model(Operation), _listed(PointEntry) | {"minItems": 1}]
     return {
         "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
-        "operation": {"anyOf": points, "description": points[0]["description"]},
+        "operation": _points(Operation, PointEntry, DrivenPoint, DrivenPointEntry),
         "shaft": of_model(DriveShaft),
+        "mechanism": of_model(Linkage),
         "solver": of_model(Solver),
         "errors": _table(
             "Errors that every joint has, by name or pattern: deviations from nominal.",
@@ -204,6 +230,12 @@ def sections() -> dict[str, Schema]:
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }
+
+
+def _points(*models: type[BaseModel]) -> Schema:
+    """Schema of one operating point or several, of one of the models; the second and fourth are entries of a list."""
+    ways = [_listed(model) | {"minItems": 1} if number % 2 else of_model(model) for number, model in enumerate(models)]
+    return {"anyOf": ways, "description": ways[0]["description"]}
 
 
 def _listed(model: type[BaseModel]) -> Schema:
@@ -258,12 +290,17 @@ def study() -> Schema:
 
 def case() -> Schema:
     """JSON schema of a case file."""
-    of_case = {name: made for name, made in sections().items() if name in OF_CASE} | {"operation": of_model(Operation)}
+    of_case = {name: made for name, made in sections().items() if name in OF_CASE}
+    of_case["operation"] = {"anyOf": [of_model(Operation), of_model(DrivenPoint)]}
     return _file("Case of tolstat: one joint", of_case, REQUIRED[:2])
 
 
 def _file(title: str, sections: Mapping[str, Schema], required: Iterable[str]) -> Schema:
-    return {"title": title} | _closed(sections) | {"required": list(required)}
+    linked: Schema = {"required": ["mechanism"]}
+    of_linkages = linked | {"properties": {"operation": _points(DrivenPoint, DrivenPointEntry)}}
+    of_joints = {"not": linked, "properties": {"operation": _points(Operation, PointEntry)}}
+    ways = {"anyOf": [of_joints, of_linkages]}
+    return {"title": title} | _closed(sections) | {"required": list(required)} | ways
 
 
 KINDS: dict[str, Callable[[], Schema]] = {"study": study, "joint": joint, "case": case}

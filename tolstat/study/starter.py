@@ -1,4 +1,4 @@
-"""A new study with comments that runs as it stands, of a joint or a drive shaft, schemas for editors, and a joint."""
+"""A new study with comments that runs as it stands, of a joint, a drive shaft or a linkage, schemas, and a joint."""
 
 from __future__ import annotations
 
@@ -80,6 +80,11 @@ def write_shaft(path: Path, size: str | None) -> list[Path]:
     row = cross_sizes.cross(size)
     study = _shaft_text(path, _beside(path), row.torque_Nm, row.length_mm, row.pin_force_kN)
     return _write(path, study, joint_text("cross.toml", row.words()))
+
+
+def write_linkage(path: Path, kind: str) -> list[Path]:
+    """Write the study of a linkage of a kind, the name of its template, with its schema; as `write`."""
+    return _write(path, _filled(f"{kind}.toml", path), None)
 
 
 def _beside(path: Path) -> str:

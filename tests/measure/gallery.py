@@ -2,8 +2,9 @@
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
 ``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, ``shaft.h5``, ``unlike_joints.h5``,
-``engine_order.h5``, ``snap_rings.h5``, and, compared with ``iso2768_f.h5``, ``rigid_shafts.h5`` and
-``line_bored.h5``, of some joints or all, and gets a picture of each, ``tilted_pin.png`` and ``statics.png``.
+``engine_order.h5``, ``snap_rings.h5``, ``hinge_line.h5``, ``four_bar.h5``, ``parallel_cranks.h5``, and, compared with
+``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of each,
+``tilted_pin.png`` and ``statics.png``.
 """
 
 from __future__ import annotations
@@ -187,19 +188,20 @@ def lots(folder: Path) -> None:
     save(figure, folder / "lots.png")
 
 
-def of_shafts(folder: Path, name: str, loads: dict[str, str], limit: str, words: str) -> None:
-    """Draw the share of shafts above the largest of some loads, by label, with 95 % intervals."""
+def of_mechanisms(folder: Path, name: str, loads: dict[str, str], words: str, what: str = "shafts") -> None:
+    """Draw the share of mechanisms above the largest of some loads with one limit, by label, with 95 % intervals."""
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
     with tolstat.open(folder / f"{name}.h5") as store:
         view = store.view()
-        for (label, pattern), colour in zip(loads.items(), ("#0072B2", "#D55E00"), strict=True):
-            force = np.max([view.load(key).values for key in view.limits if fnmatch(key, pattern)], axis=0)
+        for (label, pattern), colour in zip(loads.items(), ("#0072B2", "#D55E00", "#009E73"), strict=False):
+            keys = [key for key in view.limits if fnmatch(key, pattern)]
+            force = np.max([view.load(key).values for key in keys], axis=0)
             count = np.arange(force.size, 0, -1)
             ax.step(np.sort(force), 100 * count / force.size, color=colour, where="pre", label=label)
             lower, upper = clopper_pearson(count, force.size)
             ax.fill_between(np.sort(force), 100 * lower, 100 * upper, color=colour, step="pre", alpha=0.2, lw=0)
-        ax.axvline(view.limits[limit], color="#333333", ls="--", label="limit")
-    ax.set(xlabel=f"{words} (N)", ylabel="shafts above it (%)", yscale="log", ylim=(0.3, 150))
+        ax.axvline(view.limits[keys[0]], color="#333333", ls="--", label="limit")
+    ax.set(xlabel=words, ylabel=f"{what} above it (%)", yscale="log", ylim=(0.3, 150))
     ax.set_yticks([1, 10, 100], ["1", "10", "100"])
     ax.grid(alpha=0.3)
     ax.legend()
@@ -209,19 +211,36 @@ def of_shafts(folder: Path, name: str, loads: dict[str, str], limit: str, words:
 def shaft(folder: Path) -> None:
     """Draw the largest force of a bearing at each end."""
     ends = {"gearbox": "input.bearing_?", "axle": "output.bearing_?"}
-    of_shafts(folder, "shaft", ends, "input.bearing_a", "largest force of a bearing")
+    of_mechanisms(folder, "shaft", ends, "largest force of a bearing (N)")
 
 
 def unlike_joints(folder: Path) -> None:
     """Draw the largest force of a bearing at each end."""
     ends = {"gearbox, needles": "input.bearing_?", "axle, plain bushes": "output.bearing_?"}
-    of_shafts(folder, "unlike_joints", ends, "input.bearing_a", "largest force of a bearing")
+    of_mechanisms(folder, "unlike_joints", ends, "largest force of a bearing (N)")
 
 
 def engine_order(folder: Path) -> None:
     """Draw the largest force on a pin of each joint."""
     joints = {"joint 1": "joint1.cross?.F", "joint 2": "joint2.cross?.F"}
-    of_shafts(folder, "engine_order", joints, "joint1.cross1.F", "largest force on a pin")
+    of_mechanisms(folder, "engine_order", joints, "largest force on a pin (N)")
+
+
+def hinge_line(folder: Path) -> None:
+    """Draw the largest force of the middle hinge."""
+    of_mechanisms(folder, "hinge_line", {"middle hinge": "middle_eye.F"}, "largest force of the hinge (N)", "flaps")
+
+
+def four_bar(folder: Path) -> None:
+    """Draw the largest bending moment at each eye."""
+    eyes = {"crank and coupler": "B_eye.T", "coupler and rocker": "C_eye.T", "rocker and ground": "D_eye.T"}
+    of_mechanisms(folder, "four_bar", eyes, "largest bending moment at the root of an eye (N m)", "linkages")
+
+
+def parallel_cranks(folder: Path) -> None:
+    """Draw the largest force on each pin of the rod."""
+    pins = {"driving crank": "plate1_eye.F", "driven crank": "plate2_eye.F", "third crank": "plate3_eye.F"}
+    of_mechanisms(folder, "parallel_cranks", pins, "largest force on a pin of the rod (N)", "mechanisms")
 
 
 def statics(folder: Path) -> None:
@@ -358,6 +377,9 @@ def main(folder: Path) -> None:
         engine_order,
         statics,
         snap_rings,
+        hinge_line,
+        four_bar,
+        parallel_cranks,
     )
     for draw in (*drawn, rigid_shafts, line_bored):
         if (folder / f"{draw.__name__}.h5").exists():

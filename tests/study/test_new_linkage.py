@@ -12,7 +12,8 @@ import pytest
 import tolstat
 from tests.support.reports import call
 from tolstat.common.strict import read_toml
-from tolstat.study import schema
+from tolstat.study import axes, schema
+from tolstat.study.tolerances import fits
 
 KINDS = {"hinge": 10, "cranks": 7, "fourbar": 3}
 """Kind, and number of redundant constraints: 5 for each pair beyond those that a tree of members needs, less the rank
@@ -41,6 +42,9 @@ def test_a_new_study_of_a_linkage_runs(tmp_path: Path, kind: str) -> None:
     done = call("run", tmp_path / "mechanism.toml", "--n", 4, "--workers", 1, "--out", tmp_path / "x.h5", "--no-report")
     assert done.exit_code == 0
     assert "x.h5: 5 mechanisms, 0 failed, 0 not settled" in done.stdout + done.stderr
+    planned = call("plan", tmp_path / "mechanism.toml", "--pilot", 2, "--workers", 1).stdout
+    assert f"mobility 1, redundant constraints {KINDS[kind]}\n" in planned
+    assert "hole" not in planned
 
 
 def test_a_kind_stands_alone(tmp_path: Path) -> None:
@@ -100,3 +104,14 @@ def test_editors_mark_what_no_linkage_has(old: str, new: str) -> None:
 @pytest.mark.parametrize(("old", "new"), NAMED)
 def test_editors_know_names_of_errors_and_loads_of_linkages(old: str, new: str) -> None:
     assert faults(old, new) == []
+
+
+def test_pins_and_eyes_of_all_pairs_are_alike(tmp_path: Path) -> None:
+    call("new", tmp_path / "mechanism", "--kind", "fourbar")
+    mechanism = tolstat.load(tmp_path / "mechanism.toml").mechanism
+    assert fits.patterns(mechanism) == ("*_eye.diameter", "*_pin.diameter")
+    assert axes.is_pin("B_pin.diameter")
+    assert not axes.is_pin("B_eye.diameter")
+    zones = axes.zone_units(mechanism)
+    assert "B_pin.position" in zones
+    assert "input_pins.coaxiality" not in zones

@@ -27,7 +27,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
-from tolstat.joint import ideal
+from tolstat.joint import Operation, OperationOfLinkage, ideal
 from tolstat.sampling import draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
@@ -162,6 +162,8 @@ class Plan:
         Joints that rattle.
     assembly : Assembly
         Joints that do not go together.
+    constraints : dict of str to int
+        ``mobility`` of a linkage and number of ``redundant`` constraints; empty for joints.
     fit : list of str
         What the fit of the study means, as lines of text; empty without one.
     sweep : list of str
@@ -197,6 +199,7 @@ class Plan:
     deciding: dict[float, float]
     reversals: Reversals
     assembly: Assembly
+    constraints: dict[str, int]
     fit: list[str]
     sweep: list[str]
     tolerances: list[dict[str, Any]]
@@ -280,6 +283,7 @@ def plan(
         deciding={part * accepted: binomial.needed(part * accepted, accepted) for part in TRUE_SHARES if accepted > 0},
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()]), study.mechanism),
         assembly=_assembly(study, iid),
+        constraints=_constraints(study.operation),
         fit=fit_in_words(study),
         sweep=design.meaning(study.sweep, study.joint),
         tolerances=text.plain(meanings(study.entries).to_dict("records")),
@@ -339,6 +343,13 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     own = [options[i] for i in settled.tolist()]
     verify.run_checks(params[settled], own, study.mechanism, verify.QUICK_CHECKS, simulate_rows)
     return (time.process_time() - begin) * number / settled.size
+
+
+def _constraints(operation: Operation) -> dict[str, int]:
+    if not isinstance(operation, OperationOfLinkage):
+        return {}
+    chain = operation.linkage.chain
+    return {"mobility": chain.mobility, "redundant": chain.redundant}
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:

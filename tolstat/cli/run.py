@@ -284,6 +284,8 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
 
 def _lines(prediction: library.plan.Plan) -> Iterator[str]:
     yield f"joints: {prediction.rows}" + (f", each at {', '.join(prediction.points)}" if all(prediction.points) else "")
+    if of := prediction.constraints:
+        yield f"mobility {of['mobility']}, redundant constraints {of['redundant']}"
     yield f"random numbers a joint: {prediction.dimensions}"
     pilot = library.text.several(prediction.pilot, "joint")
     yield f"pilot: {pilot}, {prediction.failed} failed, {prediction.unsettled} not settled"

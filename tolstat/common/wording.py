@@ -19,11 +19,15 @@ _JOINTS = r"""[Jj]oint\ [12]\b | (?i:both|between\ the|cardan|universal|slip|sha
 _ROW = r"""(?<! [\w./\\*\[\]"'`=-] ) (?P<first>[Jj])oint(?P<several>s?) (?! [\w\\*\[\]"`=-] | /(?!s\b) | \.[\w*\[] )"""
 """A row: no part of a name, a key, an option or a path."""
 
+LINKAGE = "mechanism"
+"""What a row of linkages is called, whose pins are in eyes."""
+_HOLE = re.compile(r"(?<![\w./*`-])hole(s?)(?![\w.*\[`])")
+
 
 def row_of(mechanism: Mechanism) -> str:
     """What a row of a mechanism's tables is called."""
     if not mechanism.cardan:
-        return "mechanism"
+        return LINKAGE
     return "shaft" if mechanism.is_shaft else "joint"
 
 
@@ -58,6 +62,8 @@ class Wording:
 
     def __call__(self, text: str) -> str:
         """Tell a text with the word for a row; all else stays as it is."""
+        if self.word == LINKAGE:
+            text = _HOLE.sub(r"eye\1", text)
         if self == AS_WRITTEN or "oint" not in text:
             return text
         return _pattern(self.names).sub(self._told, text)

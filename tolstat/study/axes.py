@@ -135,7 +135,7 @@ ZONES = ("position", *ORIENTATIONS, "coaxiality")
 def zone_units(mechanism: Mechanism) -> dict[str, str]:
     """SI unit of what stands for several columns of the table ERROR: radial offsets, zones of features and of pairs."""
     single = features(mechanism)
-    joints = dict.fromkeys(feature[: -len(own(feature))] for feature in single)
+    joints = dict.fromkeys(feature[: -len(own(feature))] for feature in single if mechanism.cardan)
     pairs = [f"{joint}{pair}" for joint in joints for pair in PAIRS]
     names = [f"{feature}.{RADIAL}" for feature in single]
     names += [f"{feature}.{key}" for feature in (*single, *pairs) for key in ("position", *ORIENTATIONS)]
@@ -154,7 +154,8 @@ def is_pair(feature: str) -> bool:
 
 def is_pin(name: str) -> bool:
     """Whether an error is one of a pin, not of a hole."""
-    return own(name.rpartition(".")[0]).startswith("pin")
+    feature = own(name.rpartition(".")[0])
+    return feature.startswith("pin") or feature.endswith("_pin")
 
 
 def members(feature: str) -> tuple[str, ...]:
@@ -164,8 +165,8 @@ def members(feature: str) -> tuple[str, ...]:
 
 
 def alike(feature: str) -> str:
-    """Pattern of all features of the kind of one: ``pin*``, ``joint*.pin*``."""
-    return re.sub(r"\d+", "*", feature)
+    """Pattern of all features of the kind of one: ``pin*``, ``joint*.pin*``, of a linkage ``*_pin``."""
+    return re.sub(r"^.+(?=_(?:pin|eye)$)|\d+", "*", feature)
 
 
 def is_zone(name: str) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import norm
 
 from tests.measure.coverage.trial import (
+    NUMBERS,
     Asked,
     Experiment,
     Found,
@@ -30,21 +31,23 @@ from tolstat.common.loads import FloatArray
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
 JOINTS, DELIVERY = 20, 500
 """Joints of a lot, and of its next delivery."""
+MOST_SEEDS = 400
+"""Number of seeds of lots: one takes a tenth of a second."""
 
 
 def experiments() -> Iterator[Experiment]:
     """All of this file."""
     known = laws()
     for name in ("normal", "lognormal", "uniform", "rounded"):
-        for n in (60, 1024):
+        for n in NUMBERS:
             yield _independent(known[name], n)
-    for n in (100, 1024):
+    for n in NUMBERS:
         yield _unresolved(known["lognormal"], n)
     for share in SHARES:
-        for n in (100, 1024):
+        for n in NUMBERS:
             yield _delivered(share, n)
     for lot in _LOTS:
-        for share in (0.5, 0.1, 0.02, 0.002):
+        for share in (0.1, 0.02, 0.002):
             yield _of_lots(lot, share, 50)
         yield _of_lots(lot, 0.1, 30)
 
@@ -53,13 +56,15 @@ def _independent(law: Law, n: int) -> Experiment:
     levels = [float(law.ppf(1.0 - share)) + 0.01 for share in SHARES]
     asked = [Asked("share", f"{law.name}, {share:g}", n) for share in SHARES]
     asked += [Asked("quantile", f"{law.name}, {100 * share:g} %", n) for share in QUANTILES]
-    asked.append(Asked("band", law.name, n))
+    asked += [Asked("band", law.name, n), Asked("band at random levels", law.name, n)]
     shares = {level: float(law.sf(level)) for level in levels}
     loads = {share: float(law.ppf(share)) for share in QUANTILES}
 
     def once(rng: Rng) -> list[Found]:
         sample = sample_of(law.draw(rng, n))
-        return [*shares_at(sample, shares), *quantiles_at(sample, loads), _band(law, sample.valid)]
+        level = float(law.draw(rng, 1)[0])
+        at_random = shares_at(sample, {level: float(law.sf(level))})
+        return [*shares_at(sample, shares), *quantiles_at(sample, loads), _band(law, sample.valid), *at_random]
 
     return Experiment(tuple(asked), once)
 
@@ -166,4 +171,4 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
         return [*judged(sample), Found(*ends, truth)]
 
-    return Experiment((*asked, Asked("next delivery, lots", case, n)), once)
+    return Experiment((*asked, Asked("next delivery, lots", case, n)), once, MOST_SEEDS)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.analysis.test_exchanged import ishigami
-from tests.analysis.test_exchanged import ISHIGAMI_TOTAL
+from tests.analysis.test_exchanged import ISHIGAMI_TOTAL, ishigami
 from tests.analysis.test_sensitivity import ISHIGAMI_FIRST
 from tolstat.analysis import exchanged, sensitivity
 

@@ -56,7 +56,9 @@ def more(standing: Standing, file: str) -> str:
     if most > _MOST:
         return f"{head}; too near to the accepted share"
     n = max(math.ceil(most / 100.0) * 100, standing.n)
-    often = f"decides {row['label']} in {100 * POWER:.0f} % of campaigns if {text.percent(row['share'])} is the true share"
+    often = (
+        f"decides {row['label']} in {100 * POWER:.0f} % of campaigns if {text.percent(row['share'])} is the true share"
+    )
     return f"{head}; this {often}:\ntolstat assumptions {file} --run --joints {n}"
 
 

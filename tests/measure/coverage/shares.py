@@ -22,9 +22,8 @@ from tests.measure.coverage.trial import (
     shares_at,
 )
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import simultaneous
+from tolstat.analysis.binomial import clopper_pearson, simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import FloatArray
 
@@ -93,22 +92,17 @@ def _unresolved(law: Law, n: int) -> Experiment:
     return Experiment((Asked("share, joints without a load", f"{law.name}, 0.05, half of those above lost", n),), once)
 
 
-class _OfShare(Independent):
-    """Deliveries from the interval of the share, as of designs that have no counts."""
-
-    delivery = Design.delivery
-
-
 def _delivered(share: float, n: int) -> Experiment:
     """Joints above a limit in the next delivery, a random number itself."""
     number = prediction.DELIVERY
     case = f"any law, {share:g}, {number} joints delivered"
-    designs = Independent(), _OfShare()
+    half = prediction.half(0.95)
 
     def once(rng: Rng) -> list[Found]:
         above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
-        samples = (sample_of(np.arange(n) < above, design) for design in designs)
-        return [Found(*sample.delivery(0.5, number), truth) for sample in samples]
+        of_share = prediction.of_share(*map(float, clopper_pearson(above, n, half)), number)
+        ends = sample_of(np.arange(n) < above).delivery(0.5, number), of_share
+        return [Found(*each, truth) for each in ends]
 
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 

@@ -62,12 +62,7 @@ class Design:
             Confidence level of the intervals.
         """
         none = np.full(levels.shape, np.nan)
-        return Estimate(self.estimate(x, levels), none, none)
-
-    def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
-        """Share of the joints above each level, (m,), as in `shares`."""
-        with np.errstate(invalid="ignore"):  # NaN without joints
-            return np.asarray(x.above(levels) / np.float64(x.n))
+        return Estimate(x.shares(levels), none, none)
 
     def level(self, confidence: float) -> float:
         """Confidence level with which intervals are computed, for them to hold with `confidence`; by default that."""
@@ -112,7 +107,7 @@ class Independent(Design):
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""
-        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, self.level(confidence)))
+        return Estimate(x.shares(levels), *clopper_pearson(x.above(levels), x.n, self.level(confidence)))
 
     def delivery(
         self, lower: Column, upper: Column, level: float, number: int, confidence: float

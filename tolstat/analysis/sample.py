@@ -209,15 +209,11 @@ class Sample:
         bounds = (self._at(self.lower, share), self._at(self.upper, share)) if self.upper.n else (-np.inf, np.inf)
         return Quantile(*numbers, estimate, *self._interval(share, confidence), *bounds)
 
-    def _at(self, x: Column, share: float) -> float:
+    @staticmethod
+    def _at(x: Column, share: float) -> float:
         """Smallest number of a column above which at most 1 - `share` of the joints are."""
-        loads = x.ascending
         most = (1.0 - share) * (1.0 + 1e-12) + 1e-15
-
-        def reached(ranks: NDArray[np.intp]) -> Mask:
-            return np.asarray(self.design.estimate(x, loads[ranks]) <= most)
-
-        return float(loads[_first(reached, loads.size - 1, Design.ranks_at_once)])  # no joint is above the largest
+        return float(x.ascending[max(x.n - 1 - int(most * x.n), 0)])
 
     def _interval(self, share: float, confidence: float) -> tuple[float, float]:
         """Ends of the interval of a quantile."""

@@ -306,8 +306,8 @@ class ChangedJoints:
         ValueError
             No joint has a load in both.
         """
-        pairs = (sample_of(values, self.design) for values in (a[: len(b)], b))
-        change = difference.shares(*pairs, [self.level], paired=True, confidence=confidence)
+        one, other = (sample_of(values, self.design) for values in (a[: len(b)], b))
+        change = difference.shares(one, other, [self.level], paired=True, confidence=confidence)
         return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
 
     def tells(self, values: FloatArray, confidence: float = 0.95) -> bool:

@@ -100,7 +100,8 @@ def _delivered(share: float, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
-        of_share = prediction.of_share(*map(float, clopper_pearson(above, n, half)), number)
+        low, high = clopper_pearson(above, n, half)
+        of_share = prediction.of_share(float(low), float(high), number)
         ends = sample_of(np.arange(n) < above).delivery(0.5, number), of_share
         return [Found(*each, truth) for each in ends]
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm, sobol_indices
 
-from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
+from tests.analysis.test_sensitivity import ISHIGAMI_FIRST
 from tolstat.analysis import exchanged
 
 SEEDS = 500
+ISHIGAMI_TOTAL = np.array([0.557589, 0.442411, 0.243684])
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
 
 

@@ -63,7 +63,7 @@ def test_the_estimator_that_is_wrong_on_purpose_is_found_and_shares_pass():
     found = run.measure(run.QUICK, only=CONTROL)
     assert found.rows
     assert found.controls_pass == []
-    right = tuple(one for one in run.experiments() if one.asked[0].statistic == "share" and one.asked[0].n == 60)[:1]
+    right = tuple(one for one in run.experiments() if one.asked[0].statistic == "share" and one.asked[0].n == 64)[:1]
     assert run.measure(run.QUICK, among=right).failed == []
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.analysis.test_exchanged import ishigami
-from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
+from tests.analysis.test_exchanged import ISHIGAMI_TOTAL, ishigami
+from tests.analysis.test_sensitivity import ISHIGAMI_FIRST
 from tolstat.analysis import exchanged, sensitivity
 
 pytest.importorskip("SALib", reason="pip install .[oracles]")

@@ -1,10 +1,12 @@
 """Commands `causes` and `capability` on a campaign whose causes are known."""
 
+import shutil
 from contextlib import suppress
 from shlex import quote
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from tests.support import synthetic
 from tests.support.cells import body
@@ -19,6 +21,7 @@ from tolstat.questions.capability import capability
 from tolstat.questions.causes import errors as module
 from tolstat.questions.causes import worst
 from tolstat.questions.causes.errors import causes
+from tolstat.questions.shares import ChangedJoints
 from tolstat.store import ResultFile, Writer, view
 
 N = 3000
@@ -59,6 +62,27 @@ def test_known_causes_are_found_with_their_shares(path):
     others = table.drop(["pin1.offset_t", "pin2.offset_z"])
     assert others[["direction_p", "size_p"]].min(axis=None) > 0.05
     assert others["first"].max() < 0.02
+
+
+def test_intervals_are_wider_after_looks_and_shares_of_changed_joints_are_those_of_the_file(path, tmp_path):
+    looked = shutil.copy(path, tmp_path / "looked.h5")
+    with Writer.open(looked) as store:
+        store.change(stop={"reached": True, "looks": [20, N]})
+    tables, ends = [], []
+    for file in (path, looked):
+        with ResultFile.open(file) as store:
+            own = store.view()
+            tables.append(causes(own, "cross1.F").frame("errors").set_index("error"))
+            joints = ChangedJoints(own, "cross1.F", {})
+            ends.append(joints.share(joints.base)[1:])
+            above = own.load("cross1.F").above(joints.level)
+            assert ends[-1] == (above.outer_lower, above.outer_upper)
+    assert ends[1][0] < ends[0][0] < ends[0][1] < ends[1][1]
+    one, other = (table.loc["pin2.offset_z"] for table in tables)
+    assert one["first"] == other["first"]
+    widths = [row["first_upper"] - row["first_lower"] for row in (one, other)]
+    assert widths[1] / widths[0] == pytest.approx(norm.ppf(0.9875) / norm.ppf(0.975))
+    assert other["size_lower"] < one["size_lower"] < one["size_upper"] < other["size_upper"]
 
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):

@@ -16,6 +16,7 @@ import tolstat
 from tests.support import fakes, synthetic
 from tests.support.two_errors import killing, stand_in
 from tolstat import sampling, study
+from tolstat.analysis.design import Independent
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.extend import extend
@@ -704,7 +705,7 @@ def test_interval_of_a_line_on_fewer_joints_than_half_of_it_covers():
     """Against the share that a second error alone has; a share that is off by what half of the line gains is missed."""
     found, truth = [], 2.0 * norm.sf(2.2)  # exact: the second error alone is above
     joints = object.__new__(shares.Joints)
-    joints.level = 2.2
+    joints.level, joints.design = 2.2, Independent()
     for seed in range(SEEDS):
         own, other = np.random.default_rng(seed).standard_normal((2, 2000))
         joints.base, half, exact = (np.hypot(factor * own, other) for factor in (1.0, 0.5, 0.0))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
-from tolstat.analysis.design import Design, counts_by_group, or_independent
+from tolstat.analysis.design import Design
 from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
@@ -24,7 +24,8 @@ from tolstat.common.loads import FloatArray
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""
 FEW = 20
-"""Effective number of joints on a side of a level below which an interval contains that of the beta-binomial law."""
+"""Effective number of joints on a side of a level below which an interval contains that of the beta-binomial law, and
+number below which it contains that of independent joints."""
 STEP = 0.2
 """Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
 GRID, REACH = 33, 5.0
@@ -149,8 +150,7 @@ class Clustered(Design):
     covers = f"bands: pointwise 95 % intervals of the settled joints, {interval}"
     of_quantiles = "over lots"
     of_delivery = " of one new lot"
-    ranks_at_once = 2000
-    innermost = True  # a share has a higher end where few lots have the joints above
+    ranks_at_once = 2000  # a share has a higher end where few lots have the joints above
 
     def __init__(self, lots: NDArray[np.intp]) -> None:
         self.numbers, self._lots = np.unique(lots, return_inverse=True)
@@ -161,12 +161,25 @@ class Clustered(Design):
         above, joints = above[joints > 0], joints[joints > 0]
         if not joints.size:
             return super().shares(x, levels, confidence)
-        over_lots = Estimate(*interval(above, joints, confidence)[:3])
-        return or_independent(over_lots, x, levels, confidence)
+        share, lower, upper, _ = interval(above, joints, confidence)
+        count = x.above(levels)
+        low, high = clopper_pearson(count, x.n, confidence)
+        few = np.minimum(count, x.n - count) < FEW
+        return Estimate(
+            share, np.where(few, np.minimum(lower, low), lower), np.where(few, np.maximum(upper, high), upper)
+        )
 
     def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""
-        return counts_by_group(x, self._lots, levels)
+        values, levels = x.values, np.asarray(levels, dtype=float)
+        counts = ~np.isnan(values)
+        order = np.argsort(levels, kind="stable")
+        number, steps = self.numbers.size, levels.size + 1
+        below = np.searchsorted(levels[order], values[counts], side="left")  # number of levels that the joint is above
+        table = np.bincount(self._lots[counts] * steps + below, minlength=number * steps).reshape(number, steps)
+        above = np.empty((number, levels.size))
+        above[:, order] = table[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+        return above, table.sum(axis=1).astype(float)
 
     def delivery(
         self, lower: Column, upper: Column, level: float, number: int, confidence: float
@@ -183,10 +196,6 @@ class Clustered(Design):
             least, most = (float(np.searchsorted(below, share)) for share in (tail, 1.0 - tail))
             ends.append((min(least, low), min(max(most, high), float(number))))
         return ends[0][0], ends[1][1]
-
-    def units(self, n: int) -> NDArray[np.intp]:
-        """See `Design.units`: the lots."""
-        return self.numbers[self._lots]
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Clustered:
         """See `Design.only`."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.binomial import clopper_pearson, half_width
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.design import Design
 from tolstat.analysis.estimates import Column, Estimate, Quantile
 from tolstat.analysis.sample import Sample
@@ -158,40 +158,6 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
         below, above = _recovered(_lengths(of_b), _lengths(of_a), rho)
         lower, upper = estimate - float(below), estimate + float(above)
     return Difference(of_a.estimate, of_b.estimate, estimate, lower, upper)
-
-
-def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Difference:
-    """Difference of the mean loads, with Student's interval for paired differences, else Welch's (1947).
-
-    Parameters
-    ----------
-    a, b, paired, confidence
-        As in `shares`.
-
-    Returns
-    -------
-    Difference
-        The interval assumes nearly normal means: loads whose mean is dominated by a few joints need more joints.
-
-    Raises
-    ------
-    ValueError
-        As `shares`.
-    """
-    a, b = _valid(a, b, paired)
-    x, y = a.values, b.values
-    of_a, of_b = float(x.mean()), float(y.mean())
-    if not (a.design.independent and b.design.independent) or min(x.size, y.size) < 2:
-        return Difference(of_a, of_b, of_b - of_a, np.nan, np.nan)
-    if paired:
-        error, degrees = float(np.std(y - x, ddof=1) / np.sqrt(x.size)), x.size - 1.0
-    else:
-        parts = np.array([x.var(ddof=1) / x.size, y.var(ddof=1) / y.size])
-        error = float(np.sqrt(parts.sum()))
-        inverse = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
-        degrees = parts.sum() ** 2 / inverse if inverse else x.size + y.size - 2.0
-    half = float(half_width(max(a.design.level(confidence), b.design.level(confidence)), degrees)) * error
-    return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
 def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:

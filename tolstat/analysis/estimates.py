@@ -133,6 +133,11 @@ class Column:
             return np.array([np.count_nonzero(self.values > level) for level in levels], dtype=np.intp)
         return np.asarray(self.n - np.searchsorted(self.ascending, levels, side="right"))
 
+    def shares(self, levels: FloatArray) -> FloatArray:
+        """Share of the joints above each level, (m,); NaN without joints."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.above(levels) / np.float64(self.n))
+
     def replaced(self, joints: NDArray[np.intp], values: FloatArray) -> Column:
         """Return the column with other numbers for some joints; what is sorted already is not sorted again."""
         return _Replaced(self, joints, values) if joints.size else self

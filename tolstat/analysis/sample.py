@@ -209,15 +209,11 @@ class Sample:
         bounds = (self._at(self.lower, share), self._at(self.upper, share)) if self.upper.n else (-np.inf, np.inf)
         return Quantile(*numbers, estimate, *self._interval(share, confidence), *bounds)
 
-    def _at(self, x: Column, share: float) -> float:
+    @staticmethod
+    def _at(x: Column, share: float) -> float:
         """Smallest number of a column above which at most 1 - `share` of the joints are."""
-        loads = x.ascending
         most = (1.0 - share) * (1.0 + 1e-12) + 1e-15
-
-        def reached(ranks: NDArray[np.intp]) -> Mask:
-            return np.asarray(self.design.estimate(x, loads[ranks]) <= most)
-
-        return float(loads[_first(reached, loads.size - 1, Design.ranks_at_once)])  # no joint is above the largest
+        return float(x.ascending[max(x.n - 1 - int(most * x.n), 0)])
 
     def _interval(self, share: float, confidence: float) -> tuple[float, float]:
         """Ends of the interval of a quantile."""
@@ -233,8 +229,8 @@ class Sample:
             """From the largest load down: whether surely enough joints are at this load or above."""
             return np.asarray(self.design.shares(self.value, below[n - 1 - ranks], confidence).lower >= 1.0 - share)
 
-        how = self.design.ranks_at_once, self.design.innermost
-        upper, lower = _first(high_enough, n, *how), n - 1 - _first(low_enough, n, *how)
+        at_once = self.design.ranks_at_once
+        upper, lower = _first(high_enough, n, at_once), n - 1 - _first(low_enough, n, at_once)
         return float(loads[lower]) if lower >= 0 else -np.inf, float(loads[upper]) if upper < n else np.inf
 
     def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -315,12 +311,12 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
     return replace(load, status=status, parts=whole.parts, of_ratios=of_ratios)
 
 
-def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int, ever: bool = False) -> int:
-    """Find the first of the ranks 0 to n - 1 from which on a condition holds, or at which it `ever` does; n if none."""
+def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int) -> int:
+    """Find the first of the ranks 0 to n - 1 at which a condition holds, among `at_once` at a time; n if none."""
     begin, end = 0, n
     while begin < end:
         ranks = np.arange(begin, end, -(-(end - begin) // at_once))
         is_met = holds(ranks)
-        i = int(np.argmax(is_met)) if ever and is_met.any() else int(np.flatnonzero(~is_met).max(initial=-1)) + 1
+        i = int(np.argmax(is_met)) if is_met.any() else ranks.size
         begin, end = int(ranks[i - 1]) + 1 if i else begin, int(ranks[i]) if i < ranks.size else end
     return end

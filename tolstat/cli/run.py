@@ -325,7 +325,7 @@ def _lines(prediction: library.plan.Plan) -> Iterator[str]:
 
 def _duration(seconds: float) -> str:
     units = (("d", 86400.0), ("h", 3600.0), ("min", 60.0))
-    short = f"{seconds:.2g} s" if seconds >= 1 else "less than 1 s"
+    short = f"{float(f'{seconds:.2g}'):g} s" if seconds >= 1 else "less than 1 s"
     return next((f"{seconds / size:.3g} {unit}" for unit, size in units if seconds >= 2 * size), short)
 
 

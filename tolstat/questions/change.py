@@ -169,7 +169,7 @@ def _of_limit(view: View, name: str, asked: _Asked) -> dict[str, Any]:
 def _of_load(view: View, name: str, asked: _Asked) -> list[dict[str, Any]]:
     """Rows of the table ``loads``."""
     joints = shares.ChangedJoints(view, name, view.altered)
-    before, after = map(shares.sample_of, _pairs(joints, asked))
+    before, after = (shares.sample_of(values, joints.design) for values in _pairs(joints, asked))
     rows = []
     for share in QUANTILES:
         found = difference.quantiles(before, after, share, paired=True)

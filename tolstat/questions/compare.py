@@ -110,7 +110,7 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
     """Compare the exceedances and loads of two campaigns.
 
     Gives the differences between the studies and, as B - A with its 95 % interval, the difference of the share above
-    each limit; with --by, or without limits, also of quantiles and means. Joints drawn from the same seed are compared
+    each limit; with --by, or without limits, also of quantiles. Joints drawn from the same seed are compared
     in pairs, which makes the intervals narrow.
 
     With --out, writes the curves and their difference as PNG and SVG, and as CSV the differences and the joints that
@@ -124,8 +124,8 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         Campaigns. Joints are paired if both studies draw them by the same method from the same seed: an error then
         has the same random number in both, whatever its tolerance. Joints without a partner are then left out.
     by : list of str, optional
-        Load or pattern, such as cross1.F or cross*.T, whose quantiles and mean are compared; repeatable; default: loads
-        with limits.
+        Load or pattern, such as cross1.F or cross*.T, whose quantiles are compared; repeatable; default: loads with
+        limits.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
         Differences are B minus A. Fact ``paired``: whether joints are compared in pairs. Table ``shares``, one row per
         limit of either study, and `ANY_LIMIT` if both have some (each side against its own): ``load``, ``unit``,
         ``level``, fields of `difference.ShareDifference`. Table ``loads``, one row per load and ``statistic``
-        (``mean``, ``50 %`` ...): ``load``, ``unit``, fields of `difference.Difference`. Table ``switched``, one row per
+        (``50 %`` ...): ``load``, ``unit``, fields of `difference.Difference`. Table ``switched``, one row per
         pair and limit if only one joint of the pair is above the limit: ``row`` (of A), ``load``, ``unit``, ``level``,
         ``a``, ``b``. Table ``changes``, one row per ``key`` that differs between the studies, with its values ``a`` and
         ``b``.
@@ -175,7 +175,7 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
     parts: list[Part] = [
         Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, rows, loads)]),
         Table("shares", "Shares above the limits", SHARES if rows else (), rows, seen=seen),
-        Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
+        Table("loads", "Quantiles", LOADS if by or not rows else (), loads),
         Table("switched", "Pairs with one joint above a limit", (), switched),
         Table("changes", "Differences between the studies", (), keys),
         *map(Sentence, _notes(both, differing, rows, switched, apart)),
@@ -214,7 +214,7 @@ def sides(a: View, b: View) -> Sides:
 
 
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
-    """Loads whose quantiles and means are compared, which both files keep: those asked for, else those with limits."""
+    """Loads whose quantiles are compared, which both files keep: those asked for, else those with limits."""
     common, asked = _common(a, b), dict.fromkeys(by, "--by") or {name: f"limits.{name}" for name in limited}
     found = {pattern: _selected(pattern, common) for pattern in asked}
     raise_all(
@@ -246,8 +246,7 @@ def _share(both: Sides, name: str, level: float) -> Row:
 
 def _statistics(both: Sides, name: str) -> Rows:
     a, b = both.load(name)
-    statistics = {"mean": difference.means(a, b, both.paired)}
-    statistics |= {f"{100 * share:g} %": difference.quantiles(a, b, share, both.paired) for share in QUANTILES}
+    statistics = {f"{100 * share:g} %": difference.quantiles(a, b, share, both.paired) for share in QUANTILES}
     return [{"load": name, "unit": a.unit, "statistic": key, **value._asdict()} for key, value in statistics.items()]
 
 

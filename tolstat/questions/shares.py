@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial, difference
+from tolstat.analysis.design import Design, Independent
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
@@ -251,12 +252,15 @@ class ChangedJoints:
         The load in the campaign.
     level : float
         Its limit; without one, its quantile `TAIL_STARTS_AT`.
+    design : Design
+        How the joints were drawn.
     base : ndarray, shape (n,)
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
     def __init__(self, view: View, by: str | Limit, altered: Mapping[str, what_if.Altered]) -> None:
         self._study, self._altered = view.study, altered
+        self.design = view.design if view.design.independent else Independent()  # of fresh joints, see `own_joints`
         if isinstance(by, Limit):
             self.load, self.level = view.load_of(by), by.level
             ratios = zip(by.loads, by.levels, strict=True)
@@ -291,7 +295,7 @@ class ChangedJoints:
 
     def share(self, values: FloatArray, confidence: float = 0.95) -> Estimate:
         """Share of joints above the level."""
-        above = sample_of(values).above(self.level, confidence)
+        above = sample_of(values, self.design).above(self.level, confidence)
         return above.estimate, above.outer_lower, above.outer_upper
 
     def difference(self, a: FloatArray, b: FloatArray, confidence: float = 0.95) -> Estimate:
@@ -302,8 +306,8 @@ class ChangedJoints:
         ValueError
             No joint has a load in both.
         """
-        a = a[: len(b)]
-        change = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
+        one, other = (sample_of(values, self.design) for values in (a[: len(b)], b))
+        change = difference.shares(one, other, [self.level], paired=True, confidence=confidence)
         return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
 
     def tells(self, values: FloatArray, confidence: float = 0.95) -> bool:
@@ -372,9 +376,9 @@ class Simulation:
         return still
 
 
-def sample_of(values: FloatArray) -> Sample:
-    """Sample of loads; joints without one have failed."""
-    return Sample.of(values, np.full(values.size, Status.OK))
+def sample_of(values: FloatArray, design: Design | None = None) -> Sample:
+    """Sample of loads, by default of independent joints; joints without one have failed."""
+    return Sample.of(values, np.full(values.size, Status.OK), design)
 
 
 def tail_level(load: Sample) -> float:

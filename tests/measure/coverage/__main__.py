@@ -1,4 +1,4 @@
-"""``python -m tests.measure.coverage``: how often intervals contain the truth; an hour on two cores.
+"""``python -m tests.measure.coverage``: how often intervals contain the truth; half an hour on two cores.
 
 Samples are drawn from laws with known answers, and every interval that a command shows is computed from them. The
 result is the share of intervals that contain the truth, with its own interval; of those that do not, how many are above
@@ -24,7 +24,7 @@ MARK = "coverage"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=run.FULL, metavar="N", help="samples of each case; default 2000")
+    parser.add_argument("--seeds", type=int, default=run.FULL, metavar="N", help="samples of each case; default 1000")
     parser.add_argument("--quick", action="store_true", help="200 seeds: ten minutes on two cores")
     parser.add_argument("--only", default="", metavar="WORD", help="statistics whose name has this word")
     parser.add_argument("--workers", type=int, default=available_cores(), metavar="W", help="processes; default: cores")

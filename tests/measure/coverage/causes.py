@@ -9,9 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found
+from tests.measure.coverage.trial import NUMBERS, Asked, Experiment, Found, Rng, found
 from tolstat.analysis import exchanged, ranks, sensitivity
+from tolstat.analysis.design import Independent
 from tolstat.common.loads import FloatArray
+from tolstat.questions.causes import shares
 
 SLOPES = np.array([1.0, 0.5, 0.0])
 """Slopes of the loads in the three errors."""
@@ -67,15 +69,17 @@ def _normal(rng: Rng, shape: tuple[int, ...]) -> FloatArray:
 def experiments() -> Iterator[Experiment]:
     """All of this file."""
     for load in loads():
-        for n in (200, 2000):
-            yield _given_data(load, n)
+        for n in NUMBERS:
+            if n >= shares.MIN_JOINTS:
+                yield _given_data(load, n)
             yield _by_pairs(load, n)
     for share in (0.5, 0.05):
-        for n in (200, 2000):
+        for n in NUMBERS:
             yield _event(share, n)
     for share in (0.1, 0.02):
-        for n in (1024, 4096):
+        for n in (*NUMBERS[1:], 4096):
             yield _tail(share, n)
+    yield _lines()
 
 
 def _given_data(load: Load, n: int) -> Experiment:
@@ -152,6 +156,44 @@ def _tail(share: float, n: int) -> Experiment:
         for k in range(3)
     ]
     return Experiment(tuple(asked), once, refusal=(ValueError,))
+
+
+class _Joints(shares.Joints):
+    """Loads as drawn, and a level, without a campaign."""
+
+    def __init__(self, base: FloatArray, level: float) -> None:
+        self.base, self.level, self.design = base, level, Independent()
+
+
+def _lines(share: float = 0.1, first: int = 1024, most: int = 8192) -> Experiment:
+    """Looks until the order of lines half as wide is settled; lines exact have the joints of the first look only."""
+    slopes = np.array([1.0, 0.95, 0.3])
+    level = float(norm.isf(share)) * math.sqrt(float((slopes**2).sum()))
+    confidence = 1.0 - 0.05 / (1 + math.log2(most / first))
+
+    def changed(factor: float) -> FloatArray:
+        """Slopes with one line changed, (3, 3), a row each."""
+        return slopes * np.where(np.eye(3, dtype=bool), factor, 1.0)
+
+    halves, exact = changed(0.5), changed(0.0)
+    asked = [
+        Asked(f"line {word}", f"linear, {share:g}, line {k + 1}", most)
+        for word in ("half as wide", "exact")
+        for k in range(3)
+    ]
+    truths = [float(norm.sf(level / math.sqrt(float((row**2).sum())))) for row in (*halves, *exact)]
+
+    def once(rng: Rng) -> list[Found]:
+        errors, n = rng.standard_normal((most, 3)), first
+        base, half, gone = errors @ slopes, errors @ halves.T, errors[:first] @ exact.T
+        while n < most and not shares.is_settled([*half[:n].T], base[:n], level, confidence):
+            n *= 2
+        joints = _Joints(base[:n], level)
+        each = [joints.estimates(values[:n], None)[0] for values in half.T]
+        each += [joints.estimates(gone[:, k], half[:n, k])[0] for k in range(3)]
+        return [Found(low, high, truth) for (_, low, high), truth in zip(each, truths, strict=True)]
+
+    return Experiment(tuple(asked), once)
 
 
 def _larger(one: FloatArray, other: FloatArray, first: int = 0) -> float:

@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
+from tests.measure.coverage.causes import SLOPES
 from tests.measure.coverage.trial import (
+    NUMBERS,
     Asked,
     Experiment,
     Found,
@@ -18,8 +21,10 @@ from tests.measure.coverage.trial import (
     laws,
     quantiles_at,
     sample_of,
+    shares_at,
 )
-from tolstat.analysis import binomial, capability, cycles, measured, strength
+from tolstat.analysis import binomial, capability, cycles, measured, sensitivity, strength
+from tolstat.analysis.design import Looked
 from tolstat.common.loads import FloatArray
 
 
@@ -27,12 +32,12 @@ def experiments() -> Iterator[Experiment]:
     """All of this file."""
     known = laws()
     for name in ("normal", "slightly skew", "exponential", "lognormal", "uniform"):
-        for n in (100, 1000, 4000):
+        for n in (*NUMBERS, 4000):
             yield _capability(known[name], n)
     for exponent in (3.0, 5.0, 10.0):
-        for n in (60, 1024):
+        for n in NUMBERS:
             yield _equivalent(exponent, n)
-    for n in (60, 1024):
+    for n in NUMBERS:
         for part in _PARTS:
             yield _failed(part, n)
     for share in (0.5, 0.05, 0.002):
@@ -99,19 +104,27 @@ def _failed(part: _Part, n: int) -> Experiment:
     return Experiment((Asked("share of failed parts", part.name, n, fresh_share(n, part.mean)),), once)
 
 
-def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
-    """A campaign that looks at its interval until it is narrow."""
+def _until(share: float, width: float = 0.04, most: int = 5000) -> Experiment:
+    """A campaign of a linear load that looks at its interval until it is narrow; what is said of its joints then."""
+    size, design, quantiles = float(np.sqrt((SLOPES**2).sum())), Looked(), (0.5, 0.9, 0.99)
+    level, case = float(norm.isf(share)), f"linear, {share:g}, narrower than {width:g}"
+    planned, loads_of = np.array(binomial.looks(most)), {q: float(norm.ppf(q)) for q in quantiles}
+    asked = [Asked("share at a stop", case, most)]
+    asked += [Asked("quantile at a stop", f"{case}, {100 * q:g} %", most) for q in quantiles]
+    asked += [Asked("index alone, at a stop", f"{case}, error {k + 1}", most) for k in range(SLOPES.size)]
 
     def once(rng: Rng) -> list[Found]:
-        above, joints = 0, 0
-        for look in binomial.looks(most):
-            above, joints = above + int(rng.binomial(look - joints, share)), look
-            if binomial.narrow(width, above, 0, joints):
-                break
-        lower, upper = binomial.stop_interval(above, 0, joints)
-        return [Found(float(lower), float(upper), share)]
+        errors = rng.standard_normal((most, SLOPES.size))
+        loads = errors @ SLOPES / size
+        above = np.cumsum(loads > level)[planned - 1]
+        stops = np.append(np.flatnonzero(binomial.narrow(width, above, 0, planned)), planned.size - 1)
+        joints = int(planned[stops[0]])
+        sample = sample_of(loads[:joints], design)
+        indices = sensitivity.first_order(errors[:joints], sample.values, design.level(0.95))
+        of_shares = [*shares_at(sample, {level: share}), *quantiles_at(sample, loads_of)]
+        return of_shares + found(indices, SLOPES**2 / size**2)
 
-    return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)
+    return Experiment(tuple(asked), once)
 
 
 def _process(parts: int) -> Experiment:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from studies.precision.measuring import markdown as as_markdown
-from tests.measure.coverage.run import MOST, Coverage
+from tests.measure.coverage.run import LEAST, MOST, Coverage
 from tests.measure.coverage.statistics import CONTROL, STATISTICS
 from tests.measure.coverage.trial import Row
 from tolstat.display.text import align
@@ -133,10 +133,23 @@ def _verdict(found: Coverage, bullet: str = "") -> list[str]:
         parts.append("\n".join(told))
     else:
         parts.append(f"No interval misses on one side in surely more than {100 * MOST:g} % of the seeds.")
+    counted = [row for line in lines(found) for row in line.rows if line.name != CONTROL]
+    if low := [row for row in counted if row.covered[0] < LEAST]:
+        parts.append(f"Intervals that contain the truth in less than {100 * LEAST:g} %:")
+        parts.append("\n".join(f"{bullet}{_of_all(row)}" for row in low))
+    else:
+        parts.append(f"No interval contains the truth in less than {100 * LEAST:g} % of the seeds.")
     if controls:
         found_out = "not found in every case" if found.controls_pass else "found in every case"
         parts.append(f"The estimator that is wrong on purpose was {found_out}.")
     return parts
+
+
+def _of_all(row: Row) -> str:
+    covered, low, high = (100.0 * share for share in row.covered)
+    why = f" ({row.asked.known})" if row.asked.known else ""
+    numbers = f"{covered:.1f} % ({low:.1f} to {high:.1f})"
+    return f"{row.asked.statistic}, {row.asked.case}, {row.asked.n} joints: {numbers}{why}"
 
 
 def _sentence(row: Row) -> str:

@@ -17,10 +17,12 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 
-FULL, QUICK = 2000, 200
+FULL, QUICK = 1000, 200
 """Number of seeds of the whole measurement, and of its short form."""
 MOST = 0.035
 """Share of the intervals that may lie on either side of the truth."""
+LEAST = 0.93
+"""Share of the intervals that contain the truth below which a case is named."""
 CHUNK = 50
 """Number of seeds of a job: jobs are short, so that processes end together."""
 

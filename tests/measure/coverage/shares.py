@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import norm
 
 from tests.measure.coverage.trial import (
+    NUMBERS,
     Asked,
     Experiment,
     Found,
@@ -21,30 +22,31 @@ from tests.measure.coverage.trial import (
     shares_at,
 )
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import simultaneous
+from tolstat.analysis.binomial import clopper_pearson, simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Design, Independent
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import FloatArray
 
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
 JOINTS, DELIVERY = 20, 500
 """Joints of a lot, and of its next delivery."""
+MOST_SEEDS = 400
+"""Number of seeds of lots: one takes a tenth of a second."""
 
 
 def experiments() -> Iterator[Experiment]:
     """All of this file."""
     known = laws()
     for name in ("normal", "lognormal", "uniform", "rounded"):
-        for n in (60, 1024):
+        for n in NUMBERS:
             yield _independent(known[name], n)
-    for n in (100, 1024):
+    for n in NUMBERS:
         yield _unresolved(known["lognormal"], n)
     for share in SHARES:
-        for n in (100, 1024):
+        for n in NUMBERS:
             yield _delivered(share, n)
     for lot in _LOTS:
-        for share in (0.5, 0.1, 0.02, 0.002):
+        for share in (0.1, 0.02, 0.002):
             yield _of_lots(lot, share, 50)
         yield _of_lots(lot, 0.1, 30)
 
@@ -53,13 +55,15 @@ def _independent(law: Law, n: int) -> Experiment:
     levels = [float(law.ppf(1.0 - share)) + 0.01 for share in SHARES]
     asked = [Asked("share", f"{law.name}, {share:g}", n) for share in SHARES]
     asked += [Asked("quantile", f"{law.name}, {100 * share:g} %", n) for share in QUANTILES]
-    asked.append(Asked("band", law.name, n))
+    asked += [Asked("band", law.name, n), Asked("band at random levels", law.name, n)]
     shares = {level: float(law.sf(level)) for level in levels}
     loads = {share: float(law.ppf(share)) for share in QUANTILES}
 
     def once(rng: Rng) -> list[Found]:
         sample = sample_of(law.draw(rng, n))
-        return [*shares_at(sample, shares), *quantiles_at(sample, loads), _band(law, sample.valid)]
+        level = float(law.draw(rng, 1)[0])
+        at_random = shares_at(sample, {level: float(law.sf(level))})
+        return [*shares_at(sample, shares), *quantiles_at(sample, loads), _band(law, sample.valid), *at_random]
 
     return Experiment(tuple(asked), once)
 
@@ -88,22 +92,18 @@ def _unresolved(law: Law, n: int) -> Experiment:
     return Experiment((Asked("share, joints without a load", f"{law.name}, 0.05, half of those above lost", n),), once)
 
 
-class _OfShare(Independent):
-    """Deliveries from the interval of the share, as of designs that have no counts."""
-
-    delivery = Design.delivery
-
-
 def _delivered(share: float, n: int) -> Experiment:
     """Joints above a limit in the next delivery, a random number itself."""
     number = prediction.DELIVERY
     case = f"any law, {share:g}, {number} joints delivered"
-    designs = Independent(), _OfShare()
+    half = prediction.half(0.95)
 
     def once(rng: Rng) -> list[Found]:
         above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
-        samples = (sample_of(np.arange(n) < above, design) for design in designs)
-        return [Found(*sample.delivery(0.5, number), truth) for sample in samples]
+        low, high = clopper_pearson(above, n, half)
+        of_share = prediction.of_share(float(low), float(high), number)
+        ends = sample_of(np.arange(n) < above).delivery(0.5, number), of_share
+        return [Found(*each, truth) for each in ends]
 
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
@@ -166,4 +166,4 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
         return [*judged(sample), Found(*ends, truth)]
 
-    return Experiment((*asked, Asked("next delivery, lots", case, n)), once)
+    return Experiment((*asked, Asked("next delivery, lots", case, n)), once, MOST_SEEDS)

@@ -24,7 +24,6 @@ class Statistic(NamedTuple):
 
 
 LEAST, ABOUT = "at least 95 %", "95 %"
-MEANS = "95 %, of skew loads 88 %"
 EXCHANGED = "fewer than 50 pairs; few pairs that make up the variance"
 CONTROL = "normal approximation, wrong on purpose"
 """Statistic that no command shows: an interval that misses. A measurement that passes it shows nothing."""
@@ -35,6 +34,7 @@ STATISTICS = {
     "quantile": Statistic("`report`, `capability --one-in`, `fatigue`", LEAST),
     "equivalent load": Statistic("`fatigue`", LEAST),
     "band": Statistic("`report`: band of the whole curve", LEAST),
+    "band at random levels": Statistic("`report`: band at each level", LEAST),
     "share of failed parts": Statistic("`fatigue`", LEAST),
     "yield and ppm": Statistic("`capability`", LEAST),
     "next delivery": Statistic("`report`, `capability`", LEAST),
@@ -42,6 +42,7 @@ STATISTICS = {
     "Ppk": Statistic("`capability`", LEAST, "few joints: the lower end is at most 0"),
     "process, measured parts": Statistic("`assumptions`, the verdict, at 90 %", ABOUT, "fewer than 5 parts"),
     "share at a stop": Statistic("`run --until`", LEAST),
+    "quantile at a stop": Statistic("`report` after `--until`", LEAST),
     "share, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "quantile, lots": Statistic("`report`", ABOUT, "fewer than 30 lots"),
     "next delivery, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
@@ -53,8 +54,10 @@ STATISTICS = {
     "change of a share, what if": Statistic("`causes --run`", ABOUT),
     "change of a share, at a stop": Statistic("`change`", ABOUT),
     "difference of quantiles": Statistic("`compare`", ABOUT, "few joints: infinite ends"),
-    "difference of means": Statistic("`compare`", MEANS),
+    "line half as wide": Statistic("`causes --run`", ABOUT),
+    "line exact": Statistic("`causes --run`", ABOUT),
     "index alone": Statistic("`causes`", ABOUT, "fewer than 50 joints"),
+    "index alone, at a stop": Statistic("`causes` after `--until`", ABOUT, "fewer than 50 joints"),
     "index alone, exchanged": Statistic("`causes --run`", ABOUT, EXCHANGED),
     "index in all, exchanged": Statistic("`causes --run`", ABOUT, EXCHANGED),
     "index of the event": Statistic("`causes --run`", ABOUT, "no joint, or every joint, above the limit"),

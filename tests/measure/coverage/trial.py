@@ -17,6 +17,8 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import Status
 
+NUMBERS = 64, 256, 1024
+"""Numbers of joints."""
 SURE = 0.9999
 """Confidence level at which an interval is said to miss: hundreds of cases are judged, by both sides."""
 Rng = np.random.Generator

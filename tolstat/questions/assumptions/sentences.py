@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.analysis import binomial
+from tolstat.common.counts import POWER
 from tolstat.display import table, text
 from tolstat.display.verdict import WORDS
 from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
@@ -55,7 +56,10 @@ def more(standing: Standing, file: str) -> str:
     if most > _MOST:
         return f"{head}; too near to the accepted share"
     n = max(math.ceil(most / 100.0) * 100, standing.n)
-    return f"{head}; if its share stays, this decides {row['label']}:\ntolstat assumptions {file} --run --joints {n}"
+    often = (
+        f"decides {row['label']} in {100 * POWER:.0f} % of campaigns if {text.percent(row['share'])} is the true share"
+    )
+    return f"{head}; this {often}:\ntolstat assumptions {file} --run --joints {n}"
 
 
 def of_variations(standing: Standing | None, answer: str) -> str:

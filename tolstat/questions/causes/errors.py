@@ -13,7 +13,7 @@ import numpy as np
 
 from tolstat import sampling
 from tolstat.analysis import ranks, sensitivity
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common.channels import histories_of
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
@@ -314,7 +314,7 @@ def indices(view: View, by: str, logarithm: bool = False, joints: int | None = N
 
 def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], Parts, float]:
     """Names, estimates and variance from joints that are all drawn from the same tolerances."""
-    study, independent = view.study, view.design.independent
+    study, independent, confidence = view.study, view.design.independent, view.design.level(CONFIDENCE)
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
     check_scatter(view, load)
@@ -324,13 +324,13 @@ def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], P
     x = np.column_stack([components[name] for name in names])
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
     parts: dict[str, NamedTuple] = {}
-    first = sensitivity.first_order(x, response, iid=independent)
+    first = sensitivity.first_order(x, response, confidence, independent)
     above = values > shares.tail_level(load)
     if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
         scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
         z = np.column_stack([scores[name] for name in names])
-        parts |= ranks.tail(z, above[chosen], iid=independent)._asdict()
+        parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
     return names, parts | {"first": first}, float(first.variance)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import sensitivity
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.channels import channels, histories_of
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import FloatArray, unit_text
@@ -100,7 +101,7 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
         quantiles = np.asarray(np.quantile(values, SPREAD, axis=0, method="inverted_cdf"))
         band = Band(name, channels(view.mechanism)[name].unit, found.angles, drawn, quantiles)
         panels.append(_panel(band))
-        index = sensitivity.first_order(x, values[:, band.peak], iid=view.design.independent)
+        index = sensitivity.first_order(x, values[:, band.peak], view.design.level(CONFIDENCE), view.design.independent)
         peaks.append(_at_peak(band, list(errors), index))
     how = f"Over the input angle: the first {len(samples)} settled joints, {ORIGIN[found.origin]}."
     if found.apart:

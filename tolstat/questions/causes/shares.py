@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import difference, exchanged
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.mechanism import Mechanism
@@ -243,7 +243,7 @@ class Joints(ChangedJoints):
             pairs = (("", response, exchanged.indices), ("above_", events, exchanged.of_event))
             for name, (a, b, ab), estimate in pairs:
                 with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
-                    indices = estimate(a, b, ab[:, None])
+                    indices = estimate(a, b, ab[:, None], self.design.level(CONFIDENCE))
                     row |= with_ends(f"{name}alone", [end[0] for end in indices.first])
                     row |= with_ends(f"{name}in_all", [end[0] for end in indices.total])
             rows.append(row)

@@ -67,3 +67,9 @@ def test_single_joints_are_told_as_written(text):
 
 def test_a_study_that_cannot_be_read_names_nothing():
     assert Wording.of(SHAFT, "[joint") == Wording("shaft")
+
+
+def test_pins_of_linkages_are_in_eyes() -> None:
+    told = Wording("mechanism")
+    assert told("hole angles of 3 joints, larger than its hole") == "eye angles of 3 mechanisms, larger than its eye"
+    assert told("the whole of hole1.tilt_t, hole*.diameter") == "the whole of hole1.tilt_t, hole*.diameter"

@@ -191,6 +191,12 @@ HELP = Campaign(
             "new other --shaft --joint own",
             "new other --size '30.2 x 92'",
         ],
+        "new_linkage": [
+            "new flap --kind hinge",
+            "show flap.toml",
+            "new other --kind slider",
+            "new other --kind hinge --shaft",
+        ],
         "spectrum": [
             "new cycle --signal drive_cycle.csv",
             "new other --signal drive_cycle.csv --base iso2768_f.toml --exponent 5",

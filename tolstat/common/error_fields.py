@@ -11,9 +11,9 @@ from tolstat.common.mechanism import Mechanism, features, with_play
 def error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     """Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
     fields = []
-    pins = [pair.pin for pair in mechanism.pairs]
+    pins, hole = [pair.pin for pair in mechanism.pairs], "hole" if mechanism.cardan else "eye"
     for feature in features(mechanism):
-        kind = "pin" if feature in pins else "hole"
+        kind = "pin" if feature in pins else hole
         for axis in "etz":
             text = f"position error of the {kind} axis along {axis}"
             fields.append(Field(f"{feature}.offset_{axis}", "m", text))
@@ -27,7 +27,7 @@ def error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
         Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
         Field("material.E_factor", "1", "factor on Young's modulus: bushings, their damping, contact coefficients"),
-        *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in pins),
+        *(Field(f"{pin}.clearance", "m", f"deviation of the pin's radial clearance in its {hole}") for pin in pins),
         *[force] * bool(mechanism.cardan),
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),

@@ -183,4 +183,4 @@ def _gmm(unbalance: float) -> str:
 
 
 def _deg(angle: float) -> str:
-    return f"{np.degrees(angle):.5g} deg"
+    return f"{round(float(np.degrees(angle)), 6) + 0.0:.5g} deg"

@@ -143,3 +143,30 @@ RINGS = Campaign(
         "export": [f"{ROUGH}export snap_rings.h5 --csv - --nominal"],
     },
 )
+FLAP = Campaign(
+    "hinge_line",
+    ["run hinge_line.toml --n 24"],
+    {
+        "show": ["show hinge_line.toml"],
+        "row": ["show hinge_line.h5 --row 3 --out row3.svg"],
+        "page": ["report hinge_line.h5 --out page.html --accept '30 %'"],
+    },
+)
+FOURBAR = Campaign(
+    "four_bar",
+    ["run four_bar.toml --n 24"],
+    {
+        "show": ["show four_bar.toml"],
+        "page": ["report four_bar.h5 --out page.html --accept '30 %' --replay 20"],
+        "worst": ["worst four_bar.h5 --top 3"],
+    },
+)
+CRANKS = Campaign(
+    "parallel_cranks",
+    ["run parallel_cranks.toml --n 24"],
+    {
+        "plan": ["plan parallel_cranks.toml --pilot 4"],
+        "report": ["report parallel_cranks.h5 --wide --accept '30 %'"],
+        "orders": [f"{ROUGH}orders parallel_cranks.h5"],
+    },
+)

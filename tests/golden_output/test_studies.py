@@ -6,4 +6,5 @@ from tests.golden_output.same import test_output_is_that_of_the_golden_file as t
 CAMPAIGNS = (
     *(catalogue.SWEEP, catalogue.BORED, catalogue.OVERNIGHT),
     *(catalogue.TRUCK, catalogue.ORDER, catalogue.UNLIKE, catalogue.RINGS),
+    *(catalogue.FLAP, catalogue.FOURBAR, catalogue.CRANKS),
 )

@@ -14,7 +14,8 @@ from tolstat import sampling, study
 from tolstat.common.cardan import CARDAN, HOLE_OF_PIN
 from tolstat.common.errors import InputError
 from tolstat.common.mechanism import features
-from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
+from tolstat.joint.bodies import ARM_TRIADS, PIN_TRIADS
+from tolstat.joint.perturbation import perturb
 from tolstat.study import Study, axes
 from tolstat.study.tolerances.entry import meanings
 

@@ -321,7 +321,7 @@ def test_without_an_equilibrium_the_remedy_is_dynamic(params):
     row = simulate_rows(par, OPTIONS._replace(fidelity=Fidelity.QUASISTATIC)).results[0]
     said = remedy(row, OPTIONS._asdict())
     assert "no equilibrium" in said
-    again = Reason(Status(int(row["status"])), 1, 1, said).retry
+    again = Reason(Status(int(row["status"])), 1, 1, said, "").retry
     assert again == "--retry newton_failed --set solver.fidelity=dynamic"
 
 

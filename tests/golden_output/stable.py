@@ -6,20 +6,21 @@ import re
 
 PATTERNS: tuple[tuple[str, str], ...] = (
     (r"^compil(?:ing|ed)\b.*\n", ""),
-    (r"^(?:[^\n:]+: )?\d+ of \d+ (?:joint|shaft)s, (?:[^\n]* left, )?\d+ failed, \d+ not settled\n", ""),
+    (r"^(?:[^\n:]+: )?\d+ of \d+ (?:joint|shaft|mechanism)s, (?:[^\n]* left, )?\d+ failed, \d+ not settled\n", ""),
     (r"^[a-z ]+, (?:\d+:)?\d+:\d\d\n", ""),
     (r"\babout (?:\d+:)?\d+:\d\d on \d+\s+process(?:es)?", "about TIME on N processes"),
-    (r"^(simulated \d+ (?:joint|shaft)s) in \d+ s", r"\1 in TIME"),
+    (r"^(simulated \d+ (?:joint|shaft|mechanism)s) in \d+ s", r"\1 in TIME"),
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:\+00:00|Z)?", "DATE"),
     (r"\b(tolstat|python|numpy|numba|scipy|h5py) \d+\.\d+\S*?(?=[\s,;:]|$)", r"\1 VERSION"),
     (r'"(tolstat|python|numpy|numba|scipy|h5py)": "\d+\.\d+[^"]*"', r'"\1": "VERSION"'),
     (r"(?<![\w.])[0-9a-f]{16,64}(?:-dirty)?\b", "HASH"),
-    (r"^time a (joint|shaft): .*$", r"time a \1: TIME"),
+    (r"^time a (joint|shaft|mechanism): .*$", r"time a \1: TIME"),
     (r"^time: about .* on \d+ cores?", "time: about TIME on N cores"),
-    (r"^  (start|joints|shafts|check|report): (?:less than )?[\d.]+ (?:s|min|h)$", r"  \1: TIME"),
+    (r"^  (start|joints|shafts|mechanisms|check|report): (?:less than )?[\d.]+ (?:s|min|h)$", r"  \1: TIME"),
     (r"^memory: .*$", "memory: SIZE"),
     (
-        r"^.*\d of \d+ (?:joint|shaft)s, (?:[^\n]*\n    )?[^\n]*(?:joint|shaft)s/s,[^\n]*(?:\n    [^\n]*)?\n",
+        r"^.*\d of \d+ (?:joint|shaft|mechanism)s, (?:[^\n]*\n    )?"
+        r"[^\n]*(?:joint|shaft|mechanism)s/s,[^\n]*(?:\n    [^\n]*)?\n",
         "",
     ),
     (r"^( *\"?wall_s\"?): [\d.e+-]+", r"\1: TIME"),

@@ -125,7 +125,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
         listings.append(Listing("The study as it was run", store.study_text))
     composed = Page(
         view.name,
-        recorded.joint_of(store, 0).description,
+        recorded.description(store),
         scene(view),
         [decision(view, asked), *sections],
         f"{text.sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "

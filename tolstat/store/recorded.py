@@ -46,6 +46,14 @@ def joint_of(store: Reader, row: int) -> Joint:
     return varied(nominal, _values(store, row))
 
 
+def description(store: Reader) -> str:
+    """What the file says of the linkage, or of the joint."""
+    operation = store.operation
+    return (
+        operation.linkage.description if isinstance(operation, OperationOfLinkage) else joint_of(store, 0).description
+    )
+
+
 def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:
     """Joints that are simulated together in file slot `row`: one, or both of a drive shaft."""
     joint = joint_of(store, row)

@@ -48,7 +48,6 @@ class Point(NamedTuple):
         for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
             words += f", {orders.in_words(given)} of {name}" if given else ""
         words += f", {at.shaft.in_words}" if isinstance(at, OperationOfShaft) else ""
-        words += f", {at.linkage.in_words}" if isinstance(at, OperationOfLinkage) else ""
         return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
     @classmethod

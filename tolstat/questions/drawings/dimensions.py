@@ -39,7 +39,8 @@ def dimensions(joint: Joint, points: Sequence[Point]) -> Rows:
         Its operating points.
     """
     if isinstance(points[0].operation, OperationOfLinkage):
-        lines = [*_of_linkage(points[0].operation.linkage), *_of_pins(joint), *_of_points(points), *_of_parts(joint)]
+        of_pins = [*_of_pins(joint, ("eye", "eye")), *_of_points(points), *_of_parts(joint, "a pin")]
+        lines = [*_of_linkage(points[0].operation.linkage), *of_pins]
         return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in lines]
     lines = [*_of_joint(joint), *_of_points(points), *_of_parts(joint)]
     if joint2 := points[0].operation.joint2:
@@ -76,18 +77,19 @@ def _of_joint(joint: Joint) -> list[Line]:
     return [*((name, _mm(x), meaning) for name, x, meaning in rows), *_of_pins(joint)]
 
 
-def _of_pins(joint: Joint) -> list[Line]:
-    arm, contact = joint.arm, joint.contact
+def _of_pins(joint: Joint, words: tuple[str, str] = ("hole", "arm")) -> list[Line]:
+    """Lines of pins; `words`: what they turn in, and what carries this."""
+    arm, contact, (hole, beam) = joint.arm, joint.contact, words
     rows = [
         ("contact.D_P", contact.D_P, "diameter of the pins"),
-        ("contact.D_H", contact.D_H, "diameter of the holes"),
+        ("contact.D_H", contact.D_H, f"diameter of the {hole}s"),
         ("clearance", 0.5 * (contact.D_H - contact.D_P), "radial clearance"),
         ("contact.z", contact.z, "length of the contact"),
         ("pin.d", joint.pin.d, "diameter of a pin's beam"),
         ("pin.l", joint.pin.l, "length of a pin's beam"),
-        ("arm.width", arm.width, "side of an arm's section along t"),
-        ("arm.depth", arm.depth, "side of an arm's section along e"),
-        ("arm.d", arm.d, "diameter of a round arm"),
+        ("arm.width", arm.width, f"side of an {beam}'s section along t"),
+        ("arm.depth", arm.depth, f"side of an {beam}'s section along e"),
+        ("arm.d", arm.d, f"diameter of a round {beam}"),
     ]
     return [(name, _mm(x), meaning) for name, x, meaning in rows if x is not None]
 
@@ -125,10 +127,10 @@ def _of_points(points: Sequence[Point]) -> Iterator[Line]:
                 yield key, _deg(alpha), f"misalignment {of}"
 
 
-def _of_parts(joint: Joint) -> Iterator[Line]:
-    """Lines of what a joint may have beside its dimensions."""
+def _of_parts(joint: Joint, held: str = "the cross") -> Iterator[Line]:
+    """Lines of what a joint may have beside its dimensions; `held`: what lies between thrust faces."""
     if joint.thrust is not None:
-        yield "thrust.end_play", _mm(joint.thrust.end_play), "play of the cross between its faces"
+        yield "thrust.end_play", _mm(joint.thrust.end_play), f"play of {held} between its faces"
     friction = joint.friction
     if friction.mu is not None:
         yield "friction.mu", f"{friction.mu:.5g}", "coefficient of friction around the pins"

@@ -232,9 +232,9 @@ def hinge_line(folder: Path) -> None:
 
 
 def four_bar(folder: Path) -> None:
-    """Draw the largest bending moment at each eye."""
+    """Draw the largest torque at each eye."""
     eyes = {"crank and coupler": "B_eye.T", "coupler and rocker": "C_eye.T", "rocker and ground": "D_eye.T"}
-    of_mechanisms(folder, "four_bar", eyes, "largest bending moment at the root of an eye (N m)", "linkages")
+    of_mechanisms(folder, "four_bar", eyes, "largest torque at an eye (N m)", "linkages")
 
 
 def parallel_cranks(folder: Path) -> None:

@@ -156,8 +156,8 @@ OVER = "over the revolutions that count"
 ORDERS = (1, 2, 3, 4)
 """Multiples of the input speed whose amplitudes are loads."""
 _ROOT = "bending moment at the root of pin or arm"
+_MIDDLE = "torque at the middle of pin or eye"
 _FORCE = f"modulus of the bushing force {OVER}"
-_TORQUE = f"modulus of the {_ROOT} (torque of the bushing) {OVER}"
 _CONTACT = "contact force of the pin: of its outermost station, of its innermost one, resultant of all stations"
 _PSI = "|Psi|, relative error of the speed ratio, eq. (13)"
 _AXIAL = f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}"
@@ -182,7 +182,9 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
     faces = tuple(face.name for face in mechanism.faces)
     bushing: dict[str, Any] = {"decides": True, "shown": True, "averaged": True, "modulus": True}
     F = Kind("F", "F", "bushing force", "N", _FORCE, bushings, components=("F_e", "F_t", "F_z"), **bushing)
-    T = Kind("T", "T", _ROOT, "N*m", _TORQUE, bushings, components=("T_e", "T_t", "T_z"), **bushing)
+    torque = _MIDDLE if mechanism.placed else _ROOT
+    of_bushing = f"modulus of the {torque} (torque of the bushing) {OVER}"
+    T = Kind("T", "T", torque, "N*m", of_bushing, bushings, components=("T_e", "T_t", "T_z"), **bushing)
     psi = Kind("psi", "psi", "|Psi|", "1", _PSI, whole, interpolated=False)
     of_force: dict[str, Any] = {"unit": "N", "measure": F, "decides": True}
     # of placed members, the moments about their origins are small differences of large ones

@@ -18,6 +18,8 @@ from tolstat.joint.sections import Length, Triple
 
 ENDS = {"outer": (1,), "inner": (-1,), "both": (1, -1), "none": ()}
 """Ends of a pin that have a thrust face, by the word of `PairOf.faces`."""
+ACROSS = 1e-3
+"""Least sine of the angle between an axis and a direction that tells t, rad."""
 GRAVITY = 9.81
 """Acceleration by gravity, m/s^2."""
 
@@ -85,6 +87,13 @@ class Drive(Strict):
     """the angles between which it swings once to and fro in each period, from the first one; the angle zero is the one
     that the file describes. When left out: it turns"""
 
+    @field_validator("swing")
+    @classmethod
+    def _apart(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        if value and value[0] == value[1]:
+            raise refuse("both angles are the same", "give two, or leave it out: the member turns")
+        return value
+
 
 class Linkage(Strict):
     """A mechanism: members that pins join to a closed chain. Pins and eyes are those of the joint of the study."""
@@ -116,6 +125,10 @@ class Linkage(Strict):
         for name, pair in self.pair.items():
             if pair.pin == pair.eye:
                 yield f"pair.{name}", f"pin and eye are both of {pair.pin}", "give two members"
+            for key in ("t", "eye_t"):
+                across = getattr(pair, key)
+                if across and np.linalg.norm(np.cross(unit(across), unit(pair.axis))) < ACROSS:
+                    yield f"pair.{name}.{key}", "lies along the axis of the pin", "give a direction across it"
         driven = self.drive.member
         if driven == GROUND or driven not in in_pairs:
             others = ", ".join(name for name in in_pairs if name != GROUND)
@@ -208,8 +221,9 @@ def unit(direction: tuple[float, float, float]) -> Array:
 def triad(axis: Array, t: tuple[float, float, float] | None = None) -> Array:
     """Rows e, t, z of the triad of an axis: t the given direction, or x, made perpendicular; y where e is along x."""
     for other in (t, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
-        across = np.zeros(3) if other is None else np.array(other) - axis @ np.array(other) * axis
-        if np.linalg.norm(across) > 1e-3:
+        along = np.zeros(3) if other is None else unit(other)
+        across = along - axis @ along * axis
+        if np.linalg.norm(across) > ACROSS:
             across /= np.linalg.norm(across)
             return np.array([axis, across, np.cross(axis, across)])
     raise AssertionError("one of x and y is across")

@@ -323,11 +323,13 @@ def load(
 
 
 def _read(file: Reading, names: Iterable[str]) -> None:
-    """Make parts of the sections of a file; one that is there already stays."""
+    """Make parts of sections; one that is there already stays. Faults of a linkage, which gives names, end it."""
     for name in names:
         if name not in file.parts:
             with gather(file.faults):
                 file.parts[name] = READERS[name](file)
+            if name == "linkage" and "mechanism" in file.data and file.linkage is None:
+                file.finish()
 
 
 def load_case(path: str | Path) -> Study:

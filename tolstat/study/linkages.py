@@ -11,7 +11,7 @@ from tolstat.study.selection import Reading
 
 
 def read(file: Reading) -> Linkage | None:
-    """``[mechanism]``: members and pairs. Its faults end the reading: what follows needs names of its errors."""
+    """``[mechanism]``: members and pairs; None if there is none, or with faults."""
     if "mechanism" not in file.data:
         return None
     before = len(file.faults)
@@ -24,9 +24,7 @@ def read(file: Reading) -> Linkage | None:
         if len(file.faults) == before:
             with _gather_as(file, "mechanism"):
                 _ = linkage.chain
-    if len(file.faults) > before:
-        file.finish()
-    return linkage
+    return linkage if len(file.faults) == before else None
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def joint_of(store: Reader, row: int) -> Joint:
 
 def description(store: Reader) -> str:
     """What the file says of the linkage, or of the joint."""
-    operation = store.operation
+    operation = next(iter(store.points.values())).operation
     return (
         operation.linkage.description if isinstance(operation, OperationOfLinkage) else joint_of(store, 0).description
     )

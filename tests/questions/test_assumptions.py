@@ -193,6 +193,13 @@ def test_fewer_joints_than_the_campaign_has_are_an_answer(tmp_path):
 
 
 @pytest.mark.usefixtures("quick")
+def test_more_joints_than_the_campaign_has_are_drawn(tmp_path):
+    path = made(tmp_path)
+    simulated(path, joints=700)
+    assert {row["n"] for row in standing(path).rows} == {700}
+
+
+@pytest.mark.usefixtures("quick")
 def test_a_long_campaign_gives_its_first_thousand_joints(tmp_path):
     path = made(tmp_path, TEXT.replace("n = 600", "n = 1200"))
     simulated(path)
@@ -269,6 +276,9 @@ def test_joints_without_a_load_count_on_both_sides(tmp_path, quick, monkeypatch)
     assert row["share_lower"] < other["share_lower"]
     assert row["share_upper"] - row["share"] > row["n_failed"] / 600
     assert row["change_lower"] < 0.0 < row["change_upper"]
+    with ResultFile.open(path) as store:
+        told = [part.text for part in run.assumptions(store.view()).parts if isinstance(part, Sentence)]
+    assert any(each.startswith(f"joints without a result: {row['n_failed']} of 600 with ") for each in told)
 
 
 def test_a_run_that_is_stopped_goes_on(tmp_path, varied, quick, monkeypatch):

@@ -118,6 +118,7 @@ def _answer(view: View, standing: variations.Standing) -> Answer:
     idle = sentences.idle(standing)
     notes = (
         base,
+        sentences.without_result(standing),
         intervals,
         idle,
         sentences.not_varied(standing, view.path.name),
@@ -174,7 +175,7 @@ FURTHER = 4
 def simulate(
     path: Path,
     work: Work,
-    joints: Annotated[int, Opt("N", least=variations.LEAST)] = variations.JOINTS,
+    joints: Annotated[int | None, Opt("N", least=variations.LEAST)] = None,
     accepted: Accepted = math.nan,
 ) -> list[Path]:
     """Simulate the first joints of a campaign with each value of what is assumed, and keep their loads in the file.
@@ -191,8 +192,8 @@ def simulate(
     work : Work
         Workers, progress and messages.
     joints : int
-        With --run: number of joints of each variation, 1000 unless given; more than the campaign has are drawn with its
-        seed.
+        With --run: number of joints of each variation, those of the campaign unless given, at most 1000; more than the
+        campaign has are drawn with its seed.
     accepted : float
         Accepted share of the joints that exceed at least one limit; NaN if none is given.
 
@@ -215,13 +216,11 @@ def simulate(
             remedy = f"run its study: tolstat run {store.study_name}.toml"
             raise unusable(view, "has no simulated joint to compare with", remedy)
         sets.check_code(store)
-        singles, study, n = variations.singles(view.study), view.study, joints
+        singles, study, n = variations.singles(view.study), view.study, joints or variations.joints_of(view)
         if not singles:
             found = "lists no other values to try: neither the study nor its joint file has [[assumed]] with any"
             remedy = "write [[assumed]] with name, values and because in the study, see tolstat docs study"
             raise unusable(view, found, f"{remedy}, and run it again, which simulates nothing anew")
-        if joints <= variations.JOINTS:
-            n = min(joints, variations.joints_of(view))
         simulation, begin, labels = Simulation(store, view, work, view.limits), time.monotonic(), set[str]()
 
         def run(wanted: Sequence[variations.Variation], number: int) -> None:

@@ -137,6 +137,15 @@ def idle(standing: Standing) -> str:
     return f"{_listed(standing.idle)}: {without}, which do nothing to an output shaft that is rigid along its axis"
 
 
+def without_result(standing: Standing) -> str:
+    """Words on joints that have no result with other values; empty if all have one."""
+    failed = {row["label"]: f"{row['n_failed']} of {row['n']}" for row in standing.rows if row["n_failed"]}
+    if not failed:
+        return ""
+    told = ", ".join(f"{number} with {label}" for label, number in failed.items())
+    return f"joints without a result: {told}; shares are those of the others, intervals hold with them above or below"
+
+
 def still(standing: Standing) -> str:
     """Sentence on what moves nothing; empty if all that is assumed does."""
     parts = []

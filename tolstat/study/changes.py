@@ -14,6 +14,7 @@ from typing import Any
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.loads import loads_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import Joint, varied
@@ -39,12 +40,16 @@ NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
 """A number in JSON, or in a text there that is a quantity."""
 JOINT, JOINT2 = ("joint",), ("shaft", "joint2")
 """Key paths of the joints."""
+NAMED = 3
+"""Largest number of loads that a fault names."""
 NAMES = 2
 """Number of parts of a key of an operating point or fit, and of the name of an error of one joint: ``pin1.tilt_t``."""
 
 
 def _settable(mechanism: Mechanism) -> tuple[str, ...]:
-    """`SETTABLE`, and ``shaft`` of a drive shaft: a change does not make another mechanism."""
+    """`SETTABLE`, and ``shaft`` of a drive shaft, ``mechanism`` of a linkage: a change makes no other mechanism."""
+    if mechanism.placed:
+        return *SETTABLE, "mechanism"
     return (*SETTABLE, "shaft") if mechanism.is_shaft else SETTABLE
 
 
@@ -199,6 +204,9 @@ def _read(study: Study, text: str) -> Study:
         every = load(study.path, study.sampling.n, study.text, study.joint, joint2).points
         number = [point.operation for point in every].index(study.operation)
         changed = changed.at(changed.points[number].name)
+    if names := loads_of(changed.mechanism).keys() ^ loads_of(study.mechanism).keys():
+        found = f"makes another mechanism: of the two one alone has {', '.join(sorted(names)[:NAMED])}"
+        raise input_error("--set", found, "run a study of its own, and compare both files")
     return changed
 
 

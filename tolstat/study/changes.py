@@ -65,9 +65,9 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
         ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
         entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
-        operating points ``"operation.start.alpha=12 deg"``; of a drive shaft ``"shaft.alpha=8 deg"``;
-        ``"errors.pin1.tilt_t=0.1 deg"``. Later
-        ones override patterns of earlier ones.
+        operating points ``"operation.start.alpha=12 deg"``; of a drive shaft ``"shaft.alpha=8 deg"``, of a linkage
+        ``"mechanism.pair.B.clearance=0.1 mm"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later ones override patterns of
+        earlier ones.
 
     Returns
     -------

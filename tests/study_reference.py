@@ -13,7 +13,7 @@ from tolstat.common.loads import loads_of, units_of_limits
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import tables as tables_of
 from tolstat.joint import Operation
-from tolstat.joint.linkage import Drive, MemberOf, PairOf
+from tolstat.joint.linkage import Drive, ForceOn, MemberOf, PairOf
 from tolstat.joint.model import GIVEN_BY
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.shaft import SplineOfTubes, Tube
@@ -229,6 +229,7 @@ def tables() -> dict[str, str]:
         "spline": SplineOfTubes,
         "member": MemberOf,
         "pair": PairOf,
+        "force": ForceOn,
         "drive": Drive,
         "driven point": DrivenPoint,
     }

@@ -64,10 +64,11 @@ def test_frames_and_relative_motion_are_derivatives_of_the_poses(linkage, phase:
         np.testing.assert_allclose(work.place_v[i], np.tensordot(naive.FIRST, place, 1) / h, atol=1e-9)
 
 
+@pytest.mark.parametrize("pulled", [False, True], ids=["", "pulled"])
 @pytest.mark.parametrize("name", [SPATIAL, *MORE])
-def test_accelerations_balance_the_twin(name: str) -> None:
-    mechanism = linkages.mechanism_of(name)
-    par, work = linkages.parameters(name, mechanism)[0], make_work(mechanism)
+def test_accelerations_balance_the_twin(name: str, pulled: bool) -> None:
+    mechanism = linkages.mechanism_of(name, pulled)
+    par, work = linkages.parameters(name, mechanism, pulled)[0], make_work(mechanism)
     rng = np.random.default_rng(3)
     q, v, a = rng.normal(0, 2e-5, mechanism.dof), rng.normal(0, 1e-3, mechanism.dof), np.full(mechanism.dof, np.nan)
     dynamics.acceleration(0.3, q, v, par, Options(), work, a)

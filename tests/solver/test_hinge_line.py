@@ -40,10 +40,13 @@ def beam(off: Array, gap: float, k: float, moment: float) -> Array:
     raise AssertionError("one combination is in equilibrium")
 
 
-def of_study(tmp_path: Path) -> study.Study:
+FRICTIONLESS = ("mu = 0.12, mu_along = 0.12", "mu = 0.0, mu_along = 0.0")
+
+
+def of_study(tmp_path: Path, *changes: tuple[str, str]) -> study.Study:
     """The study without friction, slow enough for statics, with hinges that do not resist a tilt."""
     text = STUDY.read_text(encoding="utf-8")
-    for old, new in (("mu = 0.12, mu_along = 0.12", "mu = 0.0, mu_along = 0.0"), ('z = "20 mm"', 'z = "0.5 mm"')):
+    for old, new in (FRICTIONLESS, ('z = "20 mm"', 'z = "0.5 mm"'), *changes):
         assert old in text
         text = text.replace(old, new)
     path = tmp_path / "hinge_line.toml"
@@ -70,3 +73,33 @@ def test_hinges_carry_what_a_beam_on_springs_with_gaps_does(tmp_path: Path) -> N
         np.testing.assert_allclose(row["F_max"][pins], expected, rtol=0, atol=1e-3 * expected.max())
     alone = np.abs(beam(np.zeros(3), joint.contact.clearance, k, moment))
     np.testing.assert_allclose(alone, [-moment / 0.6, 0.0, -moment / 0.6], atol=1e-9)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_force_on_the_flap_does_what_statics_say(tmp_path: Path, turns: bool) -> None:
+    """90 N across the flap and 120 N down, 250 mm from the axis, without weight.
+
+    Holes are round: the pins of the outer hinges, which take the moment, too, meet them aslant, and the middle one
+    bears nothing. The drive takes the moment of the force across: a constant one if it turns with the flap, else with
+    the cosine of its angle, and at 90 degrees both forces of the upper hinge add up.
+    """
+    section = f"""[mechanism.force.wind]
+member = "flap"
+point = ["250 mm", "0 mm", "0 mm"]
+force = ["0 N", "90 N", "-120 N"]
+turns = {str(turns).lower()}
+
+[operation]"""
+    one = of_study(tmp_path, ("down = [0, 0, -1]\n", ""), ("[operation]", section))
+    params = joints.perturb(one.joint, one.operation, joints.nominal_errors(1, one.mechanism))
+    (result,) = simulate_rows(params, Options(), mechanism=one.mechanism).results
+    assert result["status"] in (Status.OK, Status.STATIONARY)
+    places = [bushing.name for bushing in one.mechanism.bushings]
+    forces, torques = (dict(zip(places, result[name], strict=True)) for name in ("F_max", "T_max"))
+    moment, least = 120 * 0.25 / 0.6, result["T_range"][places.index("flap_drive")]
+    aslant = np.hypot(45, moment)
+    assert forces["lower_pin"] == pytest.approx(np.hypot(aslant, 120), rel=2e-3)
+    assert forces["upper_pin"] == pytest.approx(aslant if turns else 45 + moment, rel=2e-3)
+    assert forces["middle_pin"] < 1
+    assert torques["flap_drive"] == pytest.approx(90 * 0.25, rel=1e-3)
+    assert least == pytest.approx(0.0 if turns else 90 * 0.25, abs=0.1)

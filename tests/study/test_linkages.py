@@ -12,6 +12,11 @@ from tolstat.common.errors import InputError
 STUDY = Path(__file__).parents[2] / "studies" / "four_bar.toml"
 TEXT = STUDY.read_text(encoding="utf-8")
 D = '[mechanism.pair.D]\npin = "ground"\neye = "rocker"\n'
+WIND = """[mechanism.force.wind]
+member = "crank"
+point = ["0 m", "0 m", "0 m"]
+force = ["1 N", "0 N", "0 N"]
+"""
 NO_MEMBER = "mechanism.member.wheel: missing table: a pair names it"
 
 
@@ -23,6 +28,7 @@ NO_MEMBER = "mechanism.member.wheel: missing table: a pair names it"
         ("eye_t = [4, 3, 0]", "eye_t = [0, 0, 2]", "mechanism.pair.D.eye_t: lies along the axis of the pin"),
         ('member = "crank"', 'member = "wheel"', "mechanism.drive.member: 'wheel' is in no pair"),
         ('loaded = "rocker"', 'loaded = "crank"', "mechanism.loaded: 'crank' is no member that moves freely"),
+        (D, WIND + D, "mechanism.force.wind.member: 'crank' is no member that moves freely"),
         ('loaded = "rocker"', "", "operation.torque: has no effect: no member is loaded"),
         ('mass = "4 kg"', 'mass = "-4 kg"', "mechanism.member.coupler.mass: "),
         ('point = ["80 mm", "0 mm", "0 mm"]', 'point = ["400 mm", "0 mm", "0 mm"]', "mechanism: the drive cannot turn"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tests.conftest import REFERENCE
 from tolstat import joint as joints
 from tolstat.common.mechanism import Mechanism
-from tolstat.joint.linkage import Linkage
+from tolstat.joint.linkage import ForceOn, Linkage
 from tolstat.joint.linked import frames
 from tolstat.joint.operation import OperationOfLinkage
 
@@ -155,21 +155,28 @@ def _joint(case: dict[str, Any]) -> joints.Joint:
     return joints.load("cirelli2021", values, "case.toml")
 
 
-def operation_of(name: str) -> tuple[joints.Joint, OperationOfLinkage]:
-    """Joint and operating point of a linkage of the reference."""
-    case = cases()[name]
+def operation_of(name: str, pulled: bool = False) -> tuple[joints.Joint, OperationOfLinkage]:
+    """Joint and operating point of a linkage of the reference, or of one whose first member forces pull, too."""
+    case, linkage = cases()[name], linkage_of(name)
     speed = case["speed_rpm"] * np.pi / 30
-    values = {"speed": speed, "torque": case["load_torque_Nm"], "linkage": linkage_of(name)}
+    if pulled:
+        member = next(iter(linkage.member))
+        forces = {
+            name: ForceOn(member=member, point=["1 mm", "20 mm", "-7 mm"], force=["30 N", "-40 N", "9 N"], turns=turns)
+            for name, turns in (("follower", True), ("fixed", False))
+        }
+        linkage = linkage.model_copy(update={"force": forces})
+    values = {"speed": speed, "torque": case["load_torque_Nm"], "linkage": linkage}
     return _joint(case), OperationOfLinkage.model_construct(None, **values)
 
 
 @cache
-def mechanism_of(name: str) -> Mechanism:
+def mechanism_of(name: str, pulled: bool = False) -> Mechanism:
     """The mechanism of a linkage of the reference."""
-    return joints.mechanism_of(*operation_of(name))
+    return joints.mechanism_of(*operation_of(name, pulled))
 
 
-def parameters(name: str, mechanism: Mechanism) -> np.recarray[Any, Any]:
+def parameters(name: str, mechanism: Mechanism, pulled: bool = False) -> np.recarray[Any, Any]:
     """Parameters of a linkage of the reference, with its errors, (1,)."""
     errors = joints.nominal_errors(1, mechanism)
     for pair, of in cases()[name]["pairs"].items():
@@ -177,7 +184,7 @@ def parameters(name: str, mechanism: Mechanism) -> np.recarray[Any, Any]:
             for error, value in zip(ERRORS, of[side]["errors_e_t_z_m_rad"], strict=True):
                 if error:
                     errors[f"{pair}_{side}.{error}"] = value
-    return joints.perturb(*operation_of(name), errors).view(np.recarray)
+    return joints.perturb(*operation_of(name, pulled), errors).view(np.recarray)
 
 
 def name_in_reference(name: str) -> str:

@@ -371,11 +371,16 @@ def applied(t, par, mechanism):
     if mechanism.placed:
         kinds = [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps]
         found[:, :3] = np.multiply.outer(par.mass[kinds], par.weight)
+        for force, value, place in zip(mechanism.forces, par.pull, par.pull_at, strict=True):
+            lump = mechanism.bodies.index(force.lump)
+            own = ideal_attitudes(t, par, mechanism)[lump]
+            pulled = own @ value if force.turns else value
+            found[lump] += np.concatenate([pulled, np.cross(own @ place, pulled)])
     found[:, :3] += thrown(t, par, mechanism)[: len(found)]
     if mechanism.loaded:
         loaded = mechanism.bodies.index(mechanism.loaded)
         axis = ideal_attitudes(t, par, mechanism)[loaded] @ Z
-        found[loaded, 3:] = -resisting_torque(par.omega * t, par) * axis
+        found[loaded, 3:] -= resisting_torque(par.omega * t, par) * axis
     return found
 
 

@@ -174,6 +174,13 @@ class Face(NamedTuple):
     end: int = 1
 
 
+class Force(NamedTuple):
+    """Given force on a lump; its direction is that in the ground, or turns with the lump's member."""
+
+    lump: str
+    turns: bool = False
+
+
 class Mechanism(NamedTuple):
     """A mechanism.
 
@@ -199,6 +206,8 @@ class Mechanism(NamedTuple):
         Number of orders in the series of its members' angles.
     loaded : str
         Lump that the resisting torque acts on, against z of its member; empty: it acts on the last unknown rotation.
+    forces : tuple of Force
+        Given forces.
     """
 
     name: str
@@ -216,6 +225,7 @@ class Mechanism(NamedTuple):
     spline: bool = False
     waves: int = 0
     loaded: str = ""
+    forces: tuple[Force, ...] = ()
 
     @property
     def placed(self) -> int:
@@ -344,6 +354,8 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "friction": mechanism.friction,
         "unbalanced": [body[name] for name in mechanism.unbalanced],
         "loaded": [body[name] for name in [mechanism.loaded] if name],
+        "pulled": [body[force.lump] for force in mechanism.forces],
+        "pull_turns": [force.turns for force in mechanism.forces],
         "borne": [i for i, shaft in enumerate(mechanism.shafts) if shaft.borne],
         "first_filled": lumps + len(edges),
         "cardan": [member[name] for name in mechanism.cardan],

@@ -42,6 +42,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
     """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump, bushing or pair."""
     joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
     lumps, bushings, kinds = map(len, (mechanism.lump_kinds, mechanism.bushing_kinds, mechanism.pair_kinds))
+    pulls = len(mechanism.forces)
     oblique = len(mechanism.lumps) if any(lump.quarters == OBLIQUE for lump in mechanism.lumps) else 0
     return (
         Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
@@ -76,6 +77,10 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         ),
         Field(
             "weight", "m/s^2", "acceleration by gravity, in axes of the ground", shape=(3 if mechanism.placed else 0,)
+        ),
+        Field("pull", "N", "given force, in axes of the ground, or of its member if it turns", shape=(pulls, 3)),
+        Field(
+            "pull_at", "m", "where it acts, from its lump's reference point, in axes of its member", shape=(pulls, 3)
         ),
         Field("triad", "1", "oblique triads: rows e, t, z of each lump in axes of its member", shape=(oblique, 3, 3)),
         Field("mass", "kg", "mass of a lump", shape=(lumps,)),

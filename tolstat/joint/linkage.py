@@ -95,6 +95,19 @@ class Drive(Strict):
         return value
 
 
+class ForceOn(Strict):
+    """A force on a member."""
+
+    member: str = Field(examples=["rocker"])
+    """the member"""
+    point: Place
+    """where it acts, in ground axes at the angle zero"""
+    force: tuple[units.Force, units.Force, units.Force] = Field(examples=[["0 N", "-500 N", "0 N"]])
+    """its components, in ground axes at the angle zero"""
+    turns: bool = False
+    """whether it turns with the member; when left out it keeps its direction in the ground"""
+
+
 class Linkage(Strict):
     """A mechanism: members that pins join to a closed chain. Pins and eyes are those of the joint of the study."""
 
@@ -106,6 +119,8 @@ class Linkage(Strict):
     """Pairs of a pin and an eye, by name"""
     drive: Drive
     """What moves it"""
+    force: dict[str, ForceOn] = Field(default={}, examples=[{}])
+    """Forces on members, by name"""
     loaded: str = Field(default="", examples=["rocker"])
     """member that `operation.torque` acts on, about the axis of its first pair in the file and against its direction;
     when left out: there is no torque"""
@@ -154,8 +169,10 @@ class Linkage(Strict):
         elif driven in self.member and not self._along_a_principal_axis:
             found = "has no principal axis along the axis of the drive"
             yield f"member.{driven}.axis", found, "give the axis of the drive"
-        if self.loaded and self.loaded not in self.member:
-            yield "loaded", f"{self.loaded!r} is no member that moves freely", f"write one of {', '.join(self.member)}"
+        acted_on = {f"force.{name}.member": of.member for name, of in self.force.items()}
+        for key, name in (acted_on | {"loaded": self.loaded} if self.loaded else acted_on).items():
+            if name not in self.member:
+                yield key, f"{name!r} is no member that moves freely", f"write one of {', '.join(self.member)}"
 
     @property
     def turns_alone(self) -> bool:

@@ -17,6 +17,7 @@ from tolstat.common.mechanism import (
     SERIES,
     Bushing,
     Face,
+    Force,
     Hinge,
     Lump,
     Mechanism,
@@ -80,6 +81,7 @@ def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
         friction="friction" in parts,
         waves=len(chain.members[driven].wave) if SERIES in motions.values() else 0,
         loaded=linkage.loaded,
+        forces=tuple(Force(force.member, force.turns) for force in linkage.force.values()),
     )
 
 
@@ -130,6 +132,11 @@ def write(params: Table, linkage: Linkage, joint: Joint, mechanism: Mechanism) -
         of["k"].append(k)
         of["c"].append(material.bushing_damping(k, mass, np.array(inertia), joint.bushing.xi))
         of["marker"].append(((0.0, 0.0, 0.0), triads[bushing.lump] @ lever))
+    of["pull"], of["pull_at"] = np.zeros((2, len(linkage.force), 3))
+    for i, force in enumerate(linkage.force.values()):
+        axes, origin = at[force.member]
+        of["pull"][i] = axes.T @ force.force if force.turns else force.force
+        of["pull_at"][i] = axes.T @ (np.array(force.point) - origin) - points[force.member]
     for name, values in of.items():
         params[name] = values
     return triads

@@ -7,7 +7,7 @@ about the reference points in axes of the ideal frames, in the order of the unkn
 import math
 
 from tolstat.kernel.codes import RAMP
-from tolstat.kernel.mechanics.bushing import bushing_load
+from tolstat.kernel.mechanics.bushing import accumulate, bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.friction import rub
 from tolstat.kernel.mechanics.motion import ideal_motion
@@ -84,6 +84,7 @@ def forces(t, q, v, par, work):
             work.force[body, k] = 0.0
     if par.pivot.shape[0] > 0:
         weigh(par, work)
+        pull(par, work)
     for i in range(work.load.shape[0]):
         bushing_load(i, par, work)
     for pin in range(work.contact.shape[0]):
@@ -105,6 +106,16 @@ def weigh(par, work):
         f = scale(mass, turn_back(work.attitude, par.frame[body], g))
         for k in range(3):
             work.force[body, k] += f[k]
+
+
+@njit
+def pull(par, work):
+    """Add the given forces of members, at their ideal places."""
+    for i in range(par.pulled.shape[0]):
+        body, f, at = par.pulled[i], row(par.pull, i), row(par.pull_at, i)
+        if par.pull_turns[i] == 0:
+            f = turn_back(work.attitude, par.frame[body], f)
+        accumulate(work.force, body, f, cross(at, f))
 
 
 @njit

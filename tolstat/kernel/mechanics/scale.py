@@ -12,23 +12,26 @@ SMALLEST_FORCE = 1e-3
 
 @njit
 def typical_force(par):
-    """Largest of the pins' tangential force T_r/(2R), a pin's centrifugal force and the weight, N; of T_r a bound."""
+    """Largest of the pins' tangential force T_r/(2R), a pin's centrifugal force, the given ones, N; of T_r a bound."""
     torque = abs(par.torque)
     for i in range(par.n_orders):
         torque += math.hypot(par.torque_order[i, 0], par.torque_order[i, 1])
     mass, _ = mass_of(par.pin[0], par)
-    return max(torque / (2 * par.R), mass * par.omega**2 * par.R, weight_of_all(par), SMALLEST_FORCE)
+    return max(torque / (2 * par.R), mass * par.omega**2 * par.R, given_forces(par), SMALLEST_FORCE)
 
 
 @njit
-def weight_of_all(par):
-    """Weight of all lumps, N; 0 where members have no place, and so no ground."""
+def given_forces(par):
+    """Weight of all lumps and given forces, N; 0 where members have no place, and so no ground."""
     if par.pivot.shape[0] == 0:
         return 0.0
     mass = 0.0
     for body in range(par.lump_kind.shape[0]):
         mass += mass_of(body, par)[0]
-    return mass * math.sqrt(par.weight[0] ** 2 + par.weight[1] ** 2 + par.weight[2] ** 2)
+    total = mass * math.sqrt(par.weight[0] ** 2 + par.weight[1] ** 2 + par.weight[2] ** 2)
+    for i in range(par.pull.shape[0]):
+        total += math.sqrt(par.pull[i, 0] ** 2 + par.pull[i, 1] ** 2 + par.pull[i, 2] ** 2)
+    return total
 
 
 @njit

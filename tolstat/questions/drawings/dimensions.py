@@ -104,6 +104,9 @@ def _of_linkage(linkage: Linkage) -> Iterator[Line]:
     yield "drive", f"{drive.member}{swings}", "driven member; the angle zero is the one of the file"
     if linkage.loaded:
         yield "loaded", linkage.loaded, "member that operation.torque acts on"
+    for name, force in linkage.force.items():
+        way = "turns with it" if force.turns else "keeps its direction"
+        yield f"force {name}", f"{np.linalg.norm(force.force):.4g} N on {force.member}", way
     for name, (low, high) in chain.ranges().items():
         yield name, f"{_deg(low)} to {_deg(high)}", "angle in the member before it, in a period"
 

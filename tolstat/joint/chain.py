@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tolstat.common.errors import input_error
+from tolstat.common.errors import InputError, input_error
 from tolstat.joint.material import Array
 
 GROUND = "ground"
@@ -26,6 +26,8 @@ CHECKED = 1000
 """Angles between these at which the series is checked."""
 CLOSES = 1e-9
 """Largest gap of a loop, in units of the largest distance of two points."""
+FEW_DIGITS = 1e-4
+"""The same that points and axes with too few digits leave, at most."""
 RANK = 1e-6
 """Singular value of the loop equations' derivatives, in units of the size, that counts as none."""
 COARSE, COARSE_STEPS = math.radians(2.0), 240
@@ -129,9 +131,7 @@ def solve(pairs: Mapping[str, Joined], drive: Joined, swing: tuple[float, float]
     between = 2.0 * math.pi * (np.arange(CHECKED) + 0.5) / CHECKED
     free, redundant = _mobility(loops, found)
     if free != 1:
-        ways = "does not move" if free == 0 else f"moves in {free} ways"
-        text = f"{ways}: {len(loops.tree)} members, {6 * len(loops.closing)} equations of loops, {redundant} redundant"
-        raise input_error(PLACE, text, "add or remove a member or a pair: one drive needs a mobility of one")
+        raise _not_of_one(loops, free, redundant)
     for waves in WAVES:
         members = _series(loops, found, waves)
         gap = float(_gaps(loops, angles_at(members, between)).max())
@@ -260,12 +260,30 @@ def _closed(loops: _Loops, guess: Array) -> Array:
     open_at = np.flatnonzero(~(left <= CLOSES * loops.size))
     if not len(open_at):
         return angles
-    angle, gap = math.degrees(guess[open_at[0], 0]), left[open_at[0]]
+    raise _open(loops, math.degrees(guess[open_at[0], 0]), left[open_at[0]])
+
+
+def _open(loops: _Loops, angle: float, gap: float) -> InputError:
+    """Fault of a chain that leaves a gap (m) at an angle of the drive, degrees."""
+    is_rounded = gap < FEW_DIGITS * loops.size
+    remedy = "give points and axes with more digits" if is_rounded else "check points and axes"
     if angle == 0.0:
-        found = f"a loop has a gap of {gap:.3g} m at the angle zero"
-        raise input_error(PLACE, found, "check points and axes")
+        return input_error(PLACE, f"a loop has a gap of {gap:.3g} m at the angle zero", remedy)
+    free, redundant = _mobility(loops, np.zeros((1, len(loops.tree))))
+    if free < 1 and not is_rounded:
+        return _not_of_one(loops, free, redundant)
     found = f"the drive cannot turn to {angle:.1f} deg: a loop leaves a gap of {gap:.2g} m there"
-    raise input_error(PLACE, found, "check points and axes, or let it swing: drive.swing = [...]")
+    return input_error(PLACE, found, f"{remedy}, or let it swing: drive.swing = [...]")
+
+
+def _not_of_one(loops: _Loops, free: int, redundant: int) -> InputError:
+    """Fault of a chain that moves in `free` ways, with this number of redundant equations."""
+    ways = "does not move" if free < 1 else f"moves in {free} ways"
+    found = (
+        f"{ways}: {len(loops.tree)} members move, {6 * len(loops.closing)} equations of loops, {redundant} redundant"
+    )
+    remedy = "check axes, or add or remove a member or a pair: one drive needs a mobility of one"
+    return input_error(PLACE, found, remedy)
 
 
 def _mobility(loops: _Loops, found: Array) -> tuple[int, int]:

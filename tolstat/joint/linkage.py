@@ -107,7 +107,7 @@ class Linkage(Strict):
     drive: Drive
     """What moves it"""
     loaded: str = Field(default="", examples=["rocker"])
-    """member that `operation.torque` acts on, about the axis of its first pair, against the direction of this axis;
+    """member that `operation.torque` acts on, about the axis of its first pair in the file and against its direction;
     when left out: there is no torque"""
     down: Direction | None = Field(default=None, examples=[[0, 0, -1]])
     """direction of gravity; when left out: no weight"""

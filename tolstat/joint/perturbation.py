@@ -53,7 +53,7 @@ def operating(operation: Operation, errors: Table, spline: Spline | None = None)
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    values = {name: np.full(len(errors), float(getattr(operation, name))) for name in MEANS}
+    values = {name: np.full(errors.shape, float(getattr(operation, name))) for name in MEANS}
     for name in MEANS:
         if f"operation.{name}" in (errors.dtype.names or ()):
             values[name] += errors[f"operation.{name}"]

@@ -263,11 +263,11 @@ def cases(view: View) -> Answer:
     Returns
     -------
     Answer
-        Table ``cases``, one row per joint: ``variant``, the ``values`` that define it, ``note``, ``alpha [deg]``,
-        ``case``, ``status``, ``period``, ``revolutions``, ``cost`` (`refinement.work` relative to the first joint),
-        ``remedy``; force and torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does
-        not keep are left out. If the file holds a comparison with the reference (``tolstat verify``), also
-        ``reference`` (status of the reference simulation, empty for joints that were not compared),
+        Table ``cases``, one row per joint: ``variant``, the ``values`` that define it, ``note``, of Cardan joints
+        ``alpha [deg]``, ``case``, ``status``, ``period``, ``revolutions``, ``cost`` (`refinement.work` relative to the
+        first joint), ``remedy``; force and torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that
+        the study does not keep are left out. If the file holds a comparison with the reference (``tolstat verify``),
+        also ``reference`` (status of the reference simulation, empty for joints that were not compared),
         ``reference_change`` (its closure), ``error_F`` and ``error_T`` (error of the largest load of the worst bushing,
         relative to the largest of the kind).
 
@@ -296,7 +296,7 @@ def _listed(store: Reader) -> Rows:
         "variant": [variant.family for variant in variants],
         "values": ["; ".join(f"{key} = {value}" for key, value in variant.values.items()) for variant in variants],
         "note": [variant.note for variant in variants],
-        "alpha [deg]": np.degrees(recorded.operating_points(store)["alpha"]).tolist(),
+        "alpha [deg]": np.degrees(recorded.operating_points(store).get("alpha", [])).tolist(),
         "case": [store.case_names[i] for i in design["case"]],
         "status": [Status(int(code)).label for code in results["status"]],
         "period": results["period"].tolist(),
@@ -314,7 +314,7 @@ def _listed(store: Reader) -> Rows:
             if holds(store.columns, load_of(f"{bushing}.{letter}", store.mechanism)):
                 columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b].tolist()
                 columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load].tolist()
-    return rows_of(columns | _reference(store))
+    return rows_of({name: values for name, values in columns.items() if len(values)} | _reference(store))
 
 
 def relative_errors(results: NDArray[np.void], group: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -337,7 +337,8 @@ def relative_errors(results: NDArray[np.void], group: NDArray[np.int32]) -> NDAr
     loads = np.stack([results["F_max"], results["T_max"]], axis=-1)
     loads[results["status"] != Status.OK] = np.nan
     _, first, inverse = np.unique(group, return_index=True, return_inverse=True)
-    return np.asarray(100.0 * (loads / loads[first[inverse]] - 1.0))
+    base = loads[first[inverse]]
+    return np.asarray(100.0 * (loads / np.where(base > 0.0, base, np.nan) - 1.0))
 
 
 def _reference(store: Reader) -> dict[str, Sequence[Any]]:
@@ -357,7 +358,8 @@ def _reference(store: Reader) -> dict[str, Sequence[Any]]:
 
 def _worst(row: Row, mechanism: Mechanism) -> dict[str, Any]:
     """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
-    short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "period")}
+    shown = ("variant", "alpha [deg]", "case", "status", "period")
+    short = {key: row[key] for key in shown if key in row}
     for head in ("Gamma_F [%]", "Gamma_T [%]"):
         names = [f"{bushing}.{head}" for bushing in kinds(mechanism)["F"].places]
         if gamma := [row[name] for name in names if name in row]:

@@ -104,7 +104,9 @@ def parts(
 
 
 def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Rating life of each of `places_of`, h, (n,) each; none without what they need."""
+    """Rating life of each of `places_of`, h, (n,) each; none of linkages, or without what they need."""
+    if study.mechanism.placed:
+        return {}
     bearings = [joint.bearing for joint in joints_of(study.joint, study.operation)]
     complete = [bearing for bearing in bearings if bearing is not None and not bearing.lacking(FOR_LIFE)]
     if len(complete) < len(bearings):

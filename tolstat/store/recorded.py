@@ -72,18 +72,22 @@ def operation_of(store: Reader, row: int) -> Operation:
 
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
-    """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
-    sticks = store.mechanism.spline
-    errors = store.errors(slots, (*_OPERATION, SPLINE) if sticks else _OPERATION)
+    """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`.
+
+    Linkages have a speed and a torque.
+    """
+    sticks, known = store.mechanism.spline, tables(store.mechanism).ERROR.names or ()
+    varying = [name for name in MEANS if f"operation.{name}" in known]
+    errors = store.errors(slots, [*(f"operation.{name}" for name in varying), *[SPLINE] * sticks])
 
     def at(row: int, errors: NDArray[np.void]) -> dict[str, NDArray[np.float64]]:
         return operating(operation_of(store, row), errors, joints_at(store, row)[-1].shaft.spline if sticks else None)
 
     if not store.variants:
-        return at(0, errors)
+        return {name: values for name, values in at(0, errors).items() if name in varying}
     first, last, _ = slots.indices(store.n)
     each = [at(row, errors[row - first : row - first + 1]) for row in range(first, last)]
-    return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
+    return {name: np.concatenate([point[name] for point in each]) for name in varying}
 
 
 def options_of(store: Reader, row: int, attempt: int) -> Options:

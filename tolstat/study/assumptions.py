@@ -26,6 +26,8 @@ from tolstat.study.tolerances.zones import short_axes
 
 _AXES = {"positions": ("offset_e", "offset_t", "offset_z"), "angles": ("tilt_t", "tilt_z"), "diameters": ("diameter",)}
 """Errors of a pin or hole by what they are about."""
+_OF_CARDAN = "cross", "hub", "shaft"
+"""Sections of the joint that linkages do not have."""
 
 
 class Assumption(NamedTuple):
@@ -54,9 +56,12 @@ def assumptions(study: Study) -> tuple[Assumption, ...]:
     """Assumptions that hold for the joint of a study: those of its joint file, those of the study, and measured parts.
 
     An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
+    Linkages have none of what they lack.
     """
-    replaced = {entry.name for entry in study.assumed}
-    of_joint = [entry for entry in study.joint.assumed if entry.name not in (*given(study), *replaced)]
+    out = {*given(study), *(entry.name for entry in study.assumed)}
+    of_joint = [entry for entry in study.joint.assumed if entry.name not in out]
+    if study.mechanism.placed:
+        of_joint = [entry for entry in of_joint if not set(nested(entry.values[0])) <= set(_OF_CARDAN)]
     of_values = [
         Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
         for entry in (*of_joint, *study.assumed)

@@ -14,6 +14,7 @@ from typing import Any
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.loads import loads_of
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import Joint, varied
@@ -39,12 +40,16 @@ NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
 """A number in JSON, or in a text there that is a quantity."""
 JOINT, JOINT2 = ("joint",), ("shaft", "joint2")
 """Key paths of the joints."""
+NAMED = 3
+"""Largest number of loads that a fault names."""
 NAMES = 2
 """Number of parts of a key of an operating point or fit, and of the name of an error of one joint: ``pin1.tilt_t``."""
 
 
 def _settable(mechanism: Mechanism) -> tuple[str, ...]:
-    """`SETTABLE`, and ``shaft`` of a drive shaft: a change does not make another mechanism."""
+    """`SETTABLE`, and ``shaft`` of a drive shaft, ``mechanism`` of a linkage: a change makes no other mechanism."""
+    if mechanism.placed:
+        return *SETTABLE, "mechanism"
     return (*SETTABLE, "shaft") if mechanism.is_shaft else SETTABLE
 
 
@@ -60,9 +65,9 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
         ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
         entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
-        operating points ``"operation.start.alpha=12 deg"``; of a drive shaft ``"shaft.alpha=8 deg"``;
-        ``"errors.pin1.tilt_t=0.1 deg"``. Later
-        ones override patterns of earlier ones.
+        operating points ``"operation.start.alpha=12 deg"``; of a drive shaft ``"shaft.alpha=8 deg"``, of a linkage
+        ``"mechanism.pair.B.clearance=0.1 mm"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later ones override patterns of
+        earlier ones.
 
     Returns
     -------
@@ -194,6 +199,9 @@ def _read(study: Study, text: str) -> Study:
         every = load(study.path, study.sampling.n, study.text, study.joint, joint2).points
         number = [point.operation for point in every].index(study.operation)
         changed = changed.at(changed.points[number].name)
+    if names := loads_of(changed.mechanism).keys() ^ loads_of(study.mechanism).keys():
+        found = f"makes another mechanism: of the two one alone has {', '.join(sorted(names)[:NAMED])}"
+        raise input_error("--set", found, "run a study of its own, and compare both files")
     return changed
 
 

@@ -16,7 +16,7 @@ from tolstat.common.late import tomlkit
 
 QUOTES = dict.fromkeys(map(ord, "\"'"))
 """Quotes that TOML has around parts of a key: on the command line they may be there or not."""
-SETTABLE = ("joint", "operation", "sampling", "output")
+SETTABLE = ("joint", "mechanism", "operation", "sampling", "output")
 """Sections whose keys `with_settings` sets; a setting of the solver is one of ``run --retry``."""
 
 

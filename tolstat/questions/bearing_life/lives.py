@@ -194,9 +194,13 @@ def lives_of(view: View) -> Lives:
 
 
 def turning_of(store: Reader) -> dict[str, FloatArray]:
-    """Equivalent load of each bearing (n, pins), ``omega`` (n,) and ``alpha`` (n, joints) of the joints of a file."""
+    """Equivalent load of each bearing (n, pins), ``omega`` (n,) and ``alpha`` (n, joints) of the joints of a file.
+
+    Linkages have no joints.
+    """
     operation = recorded.operating_points(store)
-    loads, alpha = store.results(slice(None), ("equivalent_load",))["equivalent_load"], operation["alpha"][:, None]
+    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
+    alpha = operation.get("alpha", np.empty((len(loads), 0)))[:, None]
     if store.mechanism.is_shaft:
         deviation = store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
         alpha = np.column_stack([alpha, store.operation.alphas[1] + deviation])
@@ -257,7 +261,10 @@ def bearings_of(view: View) -> list[Bearing | None]:
 
 
 def _bearings(view: View) -> tuple[Bearing, ...]:
-    """Section ``[bearing]`` of the joints of a file, with all that a life needs."""
+    """Section ``[bearing]`` of the joints of a file, with all that a life needs; refused of linkages."""
+    if view.mechanism.placed:
+        remedy = "take forces of the pins and their swing to the maker's calculation: tolstat export FILE --csv"
+        raise inapplicable(view, "holds no Cardan joints, whose bearings alone have a rating life here", remedy)
     sections = ("joint", "joint" if recorded.joint2_of(view.store) is None else "shaft.joint2")
     return tuple(_complete(view, *both) for both in zip(bearings_of(view), sections, strict=False))
 

@@ -13,9 +13,9 @@ that the command line starts at once.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tolstat.common import late
 from tolstat.questions import PUBLIC, told
 
 if TYPE_CHECKING:
@@ -36,48 +36,35 @@ if TYPE_CHECKING:
     from tolstat.report.page import write_page as write_page
     from tolstat.sampling import draw as draw
     from tolstat.solver.simulation import simulate_rows as simulate_rows
-    from tolstat.store import ResultFile
+    from tolstat.store import open as open
     from tolstat.study import load as load
     from tolstat.study import load_case as load_case
-
-    open = ResultFile.open
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "InputError": "tolstat.common.errors:InputError",
-    "Status": "tolstat.common.tables:Status",
-    "StoreError": "tolstat.common.errors:StoreError",
-    "TolstatError": "tolstat.common.errors:TolstatError",
-    "draw": "tolstat.sampling:draw",
-    "draw_errors": "tolstat.questions.drawings.answer:draw_errors",
-    "draw_joint": "tolstat.questions.drawings.answer:draw_joint",
-    "draw_mechanism": "tolstat.questions.drawings.answer:draw_mechanism",
-    "draw_row": "tolstat.questions.drawings.answer:draw_row",
-    "function": "tolstat.campaign.function:function",
-    "load": "tolstat.study:load",
-    "load_case": "tolstat.study:load_case",
-    "open": "tolstat.store:ResultFile.open",
-    "perturb": "tolstat.joint:perturb",
-    "run": "tolstat.campaign.run:run",
-    "simulate_case": "tolstat.campaign.replay:simulate_case",
-    "simulate_rows": "tolstat.solver.simulation:simulate_rows",
-    "statistics": "tolstat.report.answer:statistics",
-    "write_page": "tolstat.report.page:write_page",
-    "write_report": "tolstat.report.answer:write_report",
-} | {name: f"{module}:{name}" for name, module in PUBLIC.items()}
+    "Status": "tolstat.common.tables",
+    "draw": "tolstat.sampling",
+    "function": "tolstat.campaign.function",
+    "open": "tolstat.store",
+    "perturb": "tolstat.joint",
+    "run": "tolstat.campaign.run",
+    "simulate_case": "tolstat.campaign.replay",
+    "simulate_rows": "tolstat.solver.simulation",
+    "write_page": "tolstat.report.page",
+    **dict.fromkeys(("InputError", "StoreError", "TolstatError"), "tolstat.common.errors"),
+    **dict.fromkeys(("draw_errors", "draw_joint", "draw_mechanism", "draw_row"), "tolstat.questions.drawings.answer"),
+    **dict.fromkeys(("load", "load_case"), "tolstat.study"),
+    **dict.fromkeys(("statistics", "write_report"), "tolstat.report.answer"),
+    **PUBLIC,
+}
 
 __all__ = sorted(_HOMES)
+_named = late.names(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'tolstat' has no attribute {name!r}")
-    home, _, path = _HOMES[name].partition(":")
-    value: Any = import_module(home)
-    for part in path.split("."):
-        value = getattr(value, part)
-    return told(value) if name in PUBLIC else value
+    return told(_named(name)) if name in PUBLIC else _named(name)
 
 
 def __dir__() -> list[str]:

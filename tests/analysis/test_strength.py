@@ -14,10 +14,10 @@ from scipy.special import gamma, gammainc, gammaincc
 from scipy.stats import norm
 
 from tolstat.analysis import strength
-from tolstat.analysis.strength import Line
+from tolstat.analysis.strength import SNLine
 
 MPA = 1e6
-HAIBACH = Line(k=5.0, k_2=9.0, N_D=2e6, S_D=360 * MPA, T_S=1.25)
+HAIBACH = SNLine(k=5.0, k_2=9.0, N_D=2e6, S_D=360 * MPA, T_S=1.25)
 needs_pylife = pytest.mark.skipif(find_spec("pylife") is None, reason="pylife is not installed")
 CYCLES = st.lists(st.tuples(st.floats(1.0, 2000.0), st.floats(1.0, 1e7)), min_size=1, max_size=6)
 
@@ -78,14 +78,14 @@ def weibull(largest, h, n=1e8, classes=40_000):
 
 @pytest.mark.parametrize(("h", "largest"), PUBLISHED.items())
 def test_allowable_ranges_of_dnv_rp_c203(h, largest):
-    line = Line(k=4.0, k_2=5.0, N_D=1e7, S_D=MPA * 10 ** ((15.117 - 7.0) / 4.0))
+    line = SNLine(k=4.0, k_2=5.0, N_D=1e7, S_D=MPA * 10 ** ((15.117 - 7.0) / 4.0))
     found = strength.damage_at(one(np.transpose(weibull(largest, h)), line), line)[0]
     assert found == pytest.approx(1.0, rel=2e-3)  # four digits of the range to the fourth power
 
 
 def test_a_weibull_spectrum_in_closed_form_with_haibachs_slope():
     # two incomplete gamma functions; curve D of the same document has slopes 3 and 5 = 2 * 3 - 1
-    h, scale, number, line = 0.9, 12.0, 1e8, Line(k=3.0, k_2=5.0, N_D=1e7, S_D=52.63 * MPA)
+    h, scale, number, line = 0.9, 12.0, 1e8, SNLine(k=3.0, k_2=5.0, N_D=1e7, S_D=52.63 * MPA)
     x = (52.63 / scale) ** h
     parts = ((3.0, gammaincc), (5.0, gammainc))
     closed = sum((scale / 52.63) ** m * gamma(1 + m / h) * part(1 + m / h, x) for m, part in parts) * number / 1e7

@@ -15,6 +15,7 @@ from tests.support import naive
 from tests.support.of_cardan import BUSHING_LOADS, SHAFT_LOADS
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
+from tolstat.analysis.strength import SNLine
 from tolstat.common.cardan import CARDAN
 from tolstat.common.channels import components, load_histories, planes, signals_of
 from tolstat.common.load_kinds import kinds
@@ -204,7 +205,7 @@ def test_cycles_along_a_direction_are_those_of_the_sum():
 
 def test_starts_take_the_place_of_the_largest_cycle():
     here = of_signals([3.0, 5.0, 3.5, 4.5], [-1.0, 2.0], [5.0, 5.0]).with_starts(0.25)
-    line = cycles.Line(3.0, 1.0, 1.0)
+    line = SNLine(3.0, 3.0, 1.0, 1.0)
     whole = [0.25 * 5.0**3 + 0.75 * 2.0**3 + 1.0, 0.25 * 3.0**3 + 0.75 * 3.0**3, 0.25 * 5.0**3]
     np.testing.assert_allclose(cycles.damage(here, line, 1.0)[:, 0], whole)
     np.testing.assert_allclose(here.number[:, 0], [2.0, 1.0, 0.25])
@@ -216,7 +217,7 @@ def test_equivalent_load_and_damage_of_constant_amplitude():
     assert here.number.tolist() == [[3], [0]]
     load = cycles.equivalent_load(here, 5.0, revolutions=1e6, reference_cycles=2e6)
     assert load[:, 0] == pytest.approx([100.0 * 1.5**0.2, 0.0])
-    line = cycles.Line(m=4.0, S0=200.0, N0=2e6)
+    line = SNLine(4.0, 4.0, 2e6, 200.0)
     assert cycles.damage(here, line, revolutions=1e6)[:, 0] == pytest.approx([3e6 / (2e6 * 2.0**4), 0.0])
 
 
@@ -224,7 +225,7 @@ def test_a_duty_cycle_adds_damage_not_loads():
     parts = [of_signals(noise(seed), noise(seed + 10)) for seed in (1, 2)]
     shares = [0.3, 0.7]
     both = cycles.duty_cycle(parts, shares)
-    line = cycles.Line(3.0, 4.0, 1e6)
+    line = SNLine(3.0, 3.0, 1e6, 4.0)
     separate = sum(s * cycles.damage(p, line, 1e6) for s, p in zip(shares, parts, strict=True))
     np.testing.assert_allclose(cycles.damage(both, line, 1e6), separate)
     power = sum(s * cycles.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
@@ -291,7 +292,7 @@ def test_joints_without_results_have_no_values():
         table[1] = np.nan
     values = [
         cycles.equivalent_load(here, 3.0),
-        cycles.damage(here, cycles.Line(3.0, 1.0, 1e6), 1e6),
+        cycles.damage(here, SNLine(3.0, 3.0, 1e6, 1.0), 1e6),
         cycles.spectrum(here, [1.0])[..., 0],
     ]
     for value in values:

@@ -16,7 +16,8 @@ from tests.support import synthetic
 from tests.support.environment import ROOT
 from tests.support.of_cardan import BUSHING_LOADS, COMPONENTS
 from tests.support.reports import call
-from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
+from tolstat.analysis.cycles import damage, equivalent_load, moment
+from tolstat.analysis.strength import SNLine
 from tolstat.common.cardan import CARDAN, MECHANISMS, named
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import InputError, NotApplicable, StoreError
@@ -55,7 +56,7 @@ revolutions = 1e7
 line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
 """
 )
-LINE = Line(5.0, 1000.0, 2e6)
+LINE = SNLine(5.0, 5.0, 2e6, 1000.0)
 SHOWN = tuple(signal.name for signal in COMPONENTS.values() if signal.history == BUSHING_LOADS)
 
 
@@ -148,7 +149,7 @@ def test_cycles_are_of_what_is_asked_for(campaign, tmp_path):
     source.write_text(text + 'line."output.m_x" = { m = 5, S0 = "20 N*m", N0 = 2e6 }\n', encoding="utf-8")
     tolstat.run(tolstat.load(source), out, workers=1)
     loading = load_cycles(out)
-    line = Line(5.0, 20.0, 2e6)
+    line = SNLine(5.0, 5.0, 2e6, 20.0)
     sums = damage(found["cycles"].cycles.of("output.m_x"), line, 1e7)[:, 0]
     row = pd.DataFrame(fatigue.damages(loading)).set_index("channel").loc["output.m_x"]
     assert row["median"] == pytest.approx(np.quantile(sums[valid], 0.5, method="inverted_cdf"))
@@ -197,7 +198,7 @@ def rainflow_damage(store, place, component, line):
     import rainflow
 
     def moment(values):
-        return sum(number * size**line.m for size, _, number, *_ in rainflow.extract_cycles([*values, values[0]]))
+        return sum(number * size**line.k for size, _, number, *_ in rainflow.extract_cycles([*values, values[0]]))
 
     view = store.view()
     settings = view.study.fatigue
@@ -213,14 +214,14 @@ def rainflow_damage(store, place, component, line):
         whole = moment(np.roll(course, -int(np.argmax(course))))
         seen = dict(zip(visits, 2 * numbers, strict=True))
         whole += sum((revolutions[point] - seen.get(point, 0)) * moment(signal) for point, signal in signals.items())
-        sums.append(settings.revolutions / settings.turns * whole / (line.N0 * line.S0**line.m))
+        sums.append(settings.revolutions / settings.turns * whole / (line.N_D * line.S_D**line.k))
     return np.array(sums)
 
 
 @needs("rainflow")
 @pytest.mark.parametrize("alpha", ["0.5 deg", "0 deg"])
 def test_a_point_with_a_constant_load_keeps_the_cycles_between_points(tmp_path, alpha):
-    line, sums = Line(5.0, 4e3, 2e6), {}
+    line, sums = SNLine(5.0, 5.0, 2e6, 4e3), {}
     for kind in ("full", "cycles"):
         source = tmp_path / f"{kind}.toml"
         source.write_text(SEQUENCE.format(alpha=alpha, histories=kind), encoding="utf-8")
@@ -253,7 +254,7 @@ def test_a_spectrum_made_from_a_signal_counts_the_same(tmp_path):
     tolstat.run(tolstat.load(full), full.with_suffix(".h5"), workers=1)
     loading = load_cycles(full.with_suffix(".h5"), ["cross1.F_t", "fork1.T_e"])
     assert len(loading.settings.visits) > 4
-    line = Line(5.0, 4e3, 2e6)
+    line = SNLine(5.0, 5.0, 2e6, 4e3)
     with ResultFile.open(full.with_suffix(".h5")) as store:
         for channel, where in (("cross1.F_t", (0, 1)), ("fork1.T_e", (4, 3))):
             found = damage(loading.cycles.of(channel), line, loading.settings.revolutions)[:, 0]
@@ -271,7 +272,7 @@ def test_starts_count_for_lines_of_loads(campaign):
         steady = fatigue.load_cycles(store.view(), ["cross1.F_t", "fork1.F_z"])
         store.study_text = store.study_text.replace("revolutions = 1e7", "revolutions = 1e7\nstarts = 1e6")
         started = fatigue.load_cycles(store.view(), ["cross1.F_t", "fork1.F_z"])
-    line, valid = Line(5.0, 1000.0, 2e6), steady.status == tolstat.Status.OK
+    line, valid = SNLine(5.0, 5.0, 2e6, 1000.0), steady.status == tolstat.Status.OK
     reach = np.maximum(steady.cycles.high, 0.0) - np.minimum(steady.cycles.low, 0.0)
     largest = steady.cycles.ranges[..., 0].astype(float)
     expected = damage(steady.cycles, line, 1e7) + 1e6 / 2e6 * (reach**5 - largest**5) / 1000.0**5
@@ -412,7 +413,7 @@ def test_pylifes_own_damage(campaign, tmp_path):
     source = tmp_path / "sequence.toml"
     source.write_text(SEQUENCE.format(alpha="0.5 deg", histories="cycles"), encoding="utf-8")
     tolstat.run(tolstat.load(source), source.with_suffix(".h5"), workers=1)
-    curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
+    curve = pd.Series({"k_1": LINE.k, "ND": LINE.N_D, "SD": LINE.S_D / 2})  # amplitudes
     for path in (campaign(), source.with_suffix(".h5")):
         with ResultFile.open(path) as store:
             frame = pylife_frame(store.view(), ["cross1.F_t"]).set_index("joint")[["range", "mean", "cycles"]]

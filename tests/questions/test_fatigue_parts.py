@@ -159,7 +159,7 @@ def test_a_duty_cycle_adds_damage_and_starts_reach_the_extremes_of_all_points(ca
 def test_starts_are_the_cycles_of_the_whole_course(offset):
     rng = np.random.default_rng(4)
     signal = rng.normal(size=40) + offset
-    line = strength.Line(k=3.0, k_2=5.0, N_D=100.0, S_D=2.0, M=0.2)
+    line = strength.SNLine(k=3.0, k_2=5.0, N_D=100.0, S_D=2.0, M=0.2)
     n, starts = 30, 3
     settings = Fatigue(revolutions=float(n), starts=float(starts), points=(point(line),))
     started = of_signals([signal]).with_starts(starts / n)
@@ -177,7 +177,7 @@ def test_starts_are_the_cycles_of_the_whole_course(offset):
 def synthetic(n=400, seed=3, scatter=1.3, status=None):
     """Joints whose stress is one cycle of lognormal range at two points."""
     rng = np.random.default_rng(seed)
-    line = strength.Line(k=5.0, k_2=9.0, N_D=1e6, S_D=200.0, T_S=scatter)
+    line = strength.SNLine(k=5.0, k_2=9.0, N_D=1e6, S_D=200.0, T_S=scatter)
     size = 120.0 * np.exp(rng.normal(0.0, 0.3, (n, 2)))
     state = np.full(n, Status.OK, np.uint8) if status is None else np.asarray(status, np.uint8)
     size[state != Status.OK] = np.nan

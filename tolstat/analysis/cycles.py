@@ -3,8 +3,8 @@
 Cycles are those of one periodic revolution: all numbers are per revolution. `sample.Sample` has the distribution of
 these values over the *joints*.
 
-S is a range, twice an amplitude. S–N lines have no knee and no endurance limit (Miner's rule in its elementary form);
-there is no mean-load correction.
+S is a range, twice an amplitude. S–N lines of loads have no knee and no endurance limit (Miner's rule in its elementary
+form); there is no mean-load correction.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.strength import SNLine
 from tolstat.common.loads import FloatArray
 
 
@@ -202,24 +203,6 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
     return values
 
 
-class Line(NamedTuple):
-    """S–N line N = N0 (S / S0)^-m.
-
-    Attributes
-    ----------
-    m : float
-        Wöhler exponent.
-    S0 : float
-        Range with a life of `N0` cycles, N or N m.
-    N0 : float
-        Cycles to failure at `S0`.
-    """
-
-    m: float
-    S0: float
-    N0: float
-
-
 def moment(cycles: Cycles, m: float) -> FloatArray:
     """Sum of S^m over the cycles of a revolution, shape (n, channels); NaN for joints without results."""
     sums = np.empty(cycles.number.shape)
@@ -248,9 +231,9 @@ def equivalent_load(cycles: Cycles, m: float, revolutions: float = 1.0, referenc
     return np.asarray((revolutions / reference_cycles * moment(cycles, m)) ** (1.0 / m))
 
 
-def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
-    """Damage sum of `revolutions` (Palmgren 1924, Miner 1945), shape (n, channels); failure is expected at 1."""
-    return np.asarray(revolutions / line.N0 * moment(cycles, line.m) / line.S0**line.m)
+def damage(cycles: Cycles, line: SNLine, revolutions: float) -> FloatArray:
+    """Damage sum of `revolutions` by a line without knee, shape (n, channels); failure is expected at 1."""
+    return np.asarray(revolutions / line.N_D * moment(cycles, line.k) / line.S_D**line.k)
 
 
 def truncation_bound(cycles: Cycles, m: float) -> FloatArray:

@@ -23,8 +23,10 @@ DECILES = 2.5631031310892007
 """Distance between the 10 % and the 90 % quantile of the standard normal distribution."""
 
 
-class Line(NamedTuple):
-    """S–N line of a part, its scatter, and its dependence on the mean stress.
+class SNLine(NamedTuple):
+    """S–N line of a load or a part, its scatter, and its dependence on the mean stress.
+
+    Miner's rule in its elementary form has no knee: `k_2` is `k`.
 
     Attributes
     ----------
@@ -33,7 +35,7 @@ class Line(NamedTuple):
     N_D : float
         Cycles at the knee.
     S_D : float
-        Stress range at the knee that half of the parts survive, at the stress ratio `R`, Pa.
+        Range at the knee that half of the parts survive: of a load, N or N m; of a stress at the stress ratio `R`, Pa.
     T_S : float
         Scatter: strength that 90 % of the parts fall short of over that which 10 % fall short of, at least 1.
     D_c : float
@@ -132,7 +134,7 @@ def _alternating(amplitude: FloatArray, mean: FloatArray, M: float) -> FloatArra
     return np.where(mean > amplitude, tension, amplitude + M * np.maximum(mean, -amplitude))
 
 
-def sort_out(ranges: FloatArray, numbers: FloatArray, line: Line) -> Collective:
+def sort_out(ranges: FloatArray, numbers: FloatArray, line: SNLine) -> Collective:
     """Sort the cycles of joints for `damage_at` and `critical_factor`.
 
     Parameters
@@ -141,7 +143,7 @@ def sort_out(ranges: FloatArray, numbers: FloatArray, line: Line) -> Collective:
         Stress ranges at the stress ratio of the line, Pa; 0 marks an empty place, NaN a joint without results.
     numbers : ndarray, shape (n, k)
         Cycles of each range in the service life.
-    line : Line
+    line : SNLine
         S–N line.
     """
     order = np.argsort(-ranges, axis=1)
@@ -153,21 +155,21 @@ def sort_out(ranges: FloatArray, numbers: FloatArray, line: Line) -> Collective:
     return Collective(knots, np.hstack([none, steep]), np.hstack([flat, none]))
 
 
-def damage_at(collective: Collective, line: Line, factor: float = 1.0) -> FloatArray:
+def damage_at(collective: Collective, line: SNLine, factor: float = 1.0) -> FloatArray:
     """Damage sum of each joint in a part whose strength is `factor` times the median, (n,); NaN without results."""
     i = (collective.knots >= factor).sum(axis=1)[:, None]
     above, below = (np.take_along_axis(sums, i, axis=1)[:, 0] for sums in (collective.above, collective.below))
     return np.asarray(above * factor**-line.k + below * factor**-line.k_2)
 
 
-def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> FloatArray:
+def critical_factor(collective: Collective, line: SNLine, lives: float = 1.0) -> FloatArray:
     """Strength, over the median, of the part that fails at the end of `lives` service lives.
 
     Parameters
     ----------
     collective : Collective
         Cycles of n joints.
-    line : Line
+    line : SNLine
         S–N line.
     lives : float
         Number of service lives, positive.
@@ -192,14 +194,14 @@ def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> F
     return np.exp(u)
 
 
-def weakest(places: Sequence[Collective], line: Line) -> Collective:
+def weakest(places: Sequence[Collective], line: SNLine) -> Collective:
     """Cycles of each joint at the place of a part at which it fails first, in the service life.
 
     Parameters
     ----------
     places : sequence of Collective
         Cycles of the same n joints at each place; the strength of a part is one at all of them.
-    line : Line
+    line : SNLine
         S–N line.
     """
     worst = np.argmax(np.nan_to_num([critical_factor(place, line) for place in places]), axis=0)
@@ -207,7 +209,7 @@ def weakest(places: Sequence[Collective], line: Line) -> Collective:
 
 
 def probability(factor: FloatArray, T_S: float) -> FloatArray:
-    """Share of the parts whose strength is below `factor` times the median; see `Line.T_S`."""
+    """Share of the parts whose strength is below `factor` times the median; see `SNLine.T_S`."""
     if T_S <= 1.0:
         return np.where(np.isnan(factor), np.nan, (factor >= 1.0).astype(float))
     with np.errstate(divide="ignore"):

@@ -27,7 +27,7 @@ from tolstat.common.mechanism import Mechanism
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
-from tolstat.joint import Operation, OperationOfLinkage, ideal
+from tolstat.joint import OperationOfLinkage, ideal
 from tolstat.sampling import draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
@@ -256,6 +256,7 @@ def plan(
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
     results = {name: table for name, (table, _) in timed.items()}
+    chain = study.operation.linkage.chain if isinstance(study.operation, OperationOfLinkage) else None
     check = sum(_check(study, at[name], table, options) for name, table in results.items())
     slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
     stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
@@ -283,7 +284,7 @@ def plan(
         deciding={part * accepted: binomial.needed(part * accepted, accepted) for part in TRUE_SHARES if accepted > 0},
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()]), study.mechanism),
         assembly=_assembly(study, iid),
-        constraints=_constraints(study.operation),
+        constraints={"mobility": chain.mobility, "redundant": chain.redundant} if chain else {},
         fit=fit_in_words(study),
         sweep=design.meaning(study.sweep, study.joint),
         tolerances=text.plain(meanings(study.entries).to_dict("records")),
@@ -343,13 +344,6 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     own = [options[i] for i in settled.tolist()]
     verify.run_checks(params[settled], own, study.mechanism, verify.QUICK_CHECKS, simulate_rows)
     return (time.process_time() - begin) * number / settled.size
-
-
-def _constraints(operation: Operation) -> dict[str, int]:
-    if not isinstance(operation, OperationOfLinkage):
-        return {}
-    chain = operation.linkage.chain
-    return {"mobility": chain.mobility, "redundant": chain.redundant}
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void], mechanism: Mechanism) -> Reversals:

@@ -49,37 +49,16 @@ Simulate = Callable[..., Simulation]
 Progress = Callable[[Counts], None]
 
 
-def _other_start(options: Options) -> dict[str, Any]:
-    start = Start.RAMP if options.start == Start.STATIC else Start.STATIC
-    finer = {"settle_tol": 0.01 * options.settle_tol, "newton_tol": 0.1 * options.newton_tol}
-    return {**finer, "start": int(start)}
-
-
-def _finer(options: Options) -> dict[str, Any]:
-    tolerances = {"newton_tol": 0.01 * options.newton_tol, "settle_tol": 0.01 * options.settle_tol}
-    return {"steps_per_rev": 2 * options.steps_per_rev, **tolerances}
-
-
-def _other_method(options: Options) -> dict[str, Any]:
-    return {"method": int(Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2)}
-
-
-def _dynamic(options: Options) -> dict[str, Any]:
-    if options.fidelity == Fidelity.DYNAMIC:
-        return {}
-    return {"fidelity": int(Fidelity.DYNAMIC), "steps_per_rev": max(options.steps_per_rev, MIN_STEPS)}
-
-
-CHECKS: dict[str, tuple[str, Callable[[Options], dict[str, Any]]]] = {
-    "half_step": ("twice as many steps a revolution", lambda options: {"steps_per_rev": 2 * options.steps_per_rev}),
-    "finer": ("twice as many steps, 1/100 of solver.newton_tol and solver.settle_tol", _finer),
-    "newton": ("a hundredth of solver.newton_tol", lambda options: {"newton_tol": 0.01 * options.newton_tol}),
-    "settling": ("the other solver.start, 1/100 of solver.settle_tol, 1/10 of solver.newton_tol", _other_start),
-    "method": ("another solver.method", _other_method),
-    "fidelity": ("dynamic fidelity instead of a lower one", _dynamic),
-    "reference": ("scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps", lambda options: {}),
+CHECKS = {
+    "half_step": "twice as many steps a revolution",
+    "finer": "twice as many steps, 1/100 of solver.newton_tol and solver.settle_tol",
+    "newton": "a hundredth of solver.newton_tol",
+    "settling": "the other solver.start, 1/100 of solver.settle_tol, 1/10 of solver.newton_tol",
+    "method": "another solver.method",
+    "fidelity": "dynamic fidelity instead of a lower one",
+    "reference": "scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps",
 }
-"""What differs from the campaign, in words and as solver options, by name of the check."""
+"""What differs from the campaign, in words, by name of the check; see `options_of_check`."""
 
 
 def no_progress(counts: Counts) -> None:
@@ -88,7 +67,21 @@ def no_progress(counts: Counts) -> None:
 
 def options_of_check(options: Options, check: str) -> Options:
     """Return the solver options of a check, a key of `CHECKS`, for a joint with these options in the campaign."""
-    return options._replace(**CHECKS[check][1](options))
+    steps, newton, settle = options.steps_per_rev, options.newton_tol, options.settle_tol
+    changes: dict[str, dict[str, Any]] = {
+        "half_step": {"steps_per_rev": 2 * steps},
+        "finer": {"steps_per_rev": 2 * steps, "newton_tol": 0.01 * newton, "settle_tol": 0.01 * settle},
+        "newton": {"newton_tol": 0.01 * newton},
+        "settling": {
+            "start": int(Start.RAMP if options.start == Start.STATIC else Start.STATIC),
+            "settle_tol": 0.01 * settle,
+            "newton_tol": 0.1 * newton,
+        },
+        "method": {"method": int(Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2)},
+    }
+    if options.fidelity != Fidelity.DYNAMIC:
+        changes["fidelity"] = {"fidelity": int(Fidelity.DYNAMIC), "steps_per_rev": max(steps, MIN_STEPS)}
+    return options._replace(**changes.get(check, {}))
 
 
 def run_checks(
@@ -132,7 +125,7 @@ def run_checks(
                 results = _references(params, changed, mechanism, workers, progress)
             else:
                 results = simulate_each(params, changed, mechanism, simulate)
-            checks[name] = Check(CHECKS[name][0], tables.to_names(changed[0]), results)
+            checks[name] = Check(CHECKS[name], tables.to_names(changed[0]), results)
     return checks
 
 
@@ -327,15 +320,9 @@ def check_near(
             if new.size:
                 make = partial(run_checks, names=QUICK_CHECKS, workers=workers, progress=progress)
                 checked = check_slots(at_point, new, 0, make)
-                merged = checked if before is None else _merged(before, checked)
-                verification.write([(at_point, verification.NEAR, merged)])
+                merged = checked if before is None else verification.together((before, checked))
+                verification.write([(at_point, verification.NEAR, merged.only(np.argsort(merged.rows)))])
         return verification.together(verification.read_each(store.each(), verification.NEAR))
-
-
-def _merged(*both: Verification) -> Verification:
-    """Joints of both, ascending."""
-    merged = verification.together(both)
-    return merged.only(np.argsort(merged.rows))
 
 
 def check_study(

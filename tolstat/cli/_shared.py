@@ -16,20 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import (
-    answers,
-    assumptions,
-    mounting,
-    pool,
-    recorded,
-    rewording,
-    run,
-    stores,
-    studies,
-    table,
-    tables,
-    works,
-)
+from tolstat.cli import _library as library
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.common.late import pandas as pd
@@ -68,17 +55,17 @@ def about(wording: Wording) -> None:
     _TOLD.wording = wording
 
 
-def loaded(path: Path, **choices: Any) -> studies.Study:
+def loaded(path: Path, **choices: Any) -> library.studies.Study:
     """Load the study that a command is about."""
-    study = studies.load(path, **choices)
+    study = library.studies.load(path, **choices)
     about(study.wording)
     return study
 
 
-def opened(path: Path) -> stores.ResultFile:
+def opened(path: Path) -> library.stores.ResultFile:
     """Open the result file that a command is about."""
-    store = stores.ResultFile.open(path)
-    about(recorded.wording_of(store))
+    store = library.stores.ResultFile.open(path)
+    about(library.recorded.wording_of(store))
     return store
 
 
@@ -87,9 +74,9 @@ def told(text: str) -> str:
     return _TOLD.wording(text)
 
 
-def answered(answer: answers.Answer) -> answers.Answer:
+def answered(answer: library.answers.Answer) -> library.answers.Answer:
     """Answer with the word for the rows of what the command is about."""
-    return rewording.answer(answer, _TOLD.wording)
+    return library.rewording.answer(answer, _TOLD.wording)
 
 
 class _Stderr(logging.Handler):
@@ -191,7 +178,7 @@ def progress(first: str = "") -> Iterator[Display]:
 
 
 def deliver(
-    answer: answers.Answer, wide: bool, as_json: bool = False, stem: Path | None = None, documents: bool = False
+    answer: library.answers.Answer, wide: bool, as_json: bool = False, stem: Path | None = None, documents: bool = False
 ) -> None:
     """Write the files of an answer, print it, and tell their names.
 
@@ -210,27 +197,27 @@ def deliver(
         say(f"wrote {path}")
 
 
-def _print_parts(answer: answers.Answer, wide: bool) -> None:
+def _print_parts(answer: library.answers.Answer, wide: bool) -> None:
     first = True
     for part in answer.parts:
-        if isinstance(part, answers.Table) and part.columns:
+        if isinstance(part, library.answers.Table) and part.columns:
             if not first:
                 echo(f"\n{part.title}")
             print_table(part.columns, part.for_people, wide)
             first = False
-        elif isinstance(part, answers.Listing):
+        elif isinstance(part, library.answers.Listing):
             echo(f"\n{part.title}\n{part.text}")
-        elif isinstance(part, answers.Sentence):
+        elif isinstance(part, library.answers.Sentence):
             if part.place == "lead":
-                echo(textwrap.fill(part.text, table.WIDE if wide else WIDTH))
+                echo(textwrap.fill(part.text, library.table.WIDE if wide else WIDTH))
                 first = False
             else:
                 say(part.text)
 
 
-def print_table(columns: Sequence[table.Column], rows: table.Rows, wide: bool) -> None:
+def print_table(columns: Sequence[library.table.Column], rows: library.table.Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
-    text, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
+    text, missing = library.table.fitted(columns, rows, None if wide else library.table.WIDTH)
     echo(text)
     if missing:
         say(missing)
@@ -271,23 +258,23 @@ def write_frame(frame: pd.DataFrame, target: str | Path, what: str = "") -> None
 
 
 @contextmanager
-def work(**settings: Any) -> Iterator[works.Work]:
+def work(**settings: Any) -> Iterator[library.works.Work]:
     """Work of one command with progress on standard error; `settings` are fields of `Work`.
 
     A simulation that is stopped, or loses its workers, says how far it came and ends with the exit code of that.
     """
     try:
         with progress() as shown:
-            yield works.Work(display=shown, tell=say, **settings)
-    except run.Interrupted as stop:
+            yield library.works.Work(display=shown, tell=say, **settings)
+    except library.run.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
-    except pool.WorkerDied as error:
+    except library.pool.WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
 
 
-def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[tables.Variant] = ()) -> None:
+def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[library.tables.Variant] = ()) -> None:
     """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
 
     Of several joints with a warning about the same key the first is printed, and how many others there are.
@@ -302,14 +289,14 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[table
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def print_warnings_of_joint2(path: Path, study: studies.Study) -> None:
+def print_warnings_of_joint2(path: Path, study: library.studies.Study) -> None:
     """Print the warnings of joint 2 of a drive shaft, if it is another than joint 1; see `Joint.warnings`."""
     if joint2 := study.operation.joint2:
         for fault in joint2.warnings():
             warn(f"warning: {path}: {replace(fault, place=f'shaft.joint2.{fault.place}')}")
 
 
-def print_study_notes(path: Path, study: studies.Study) -> None:
+def print_study_notes(path: Path, study: library.studies.Study) -> None:
     """Print what a study stands on, and its warnings.
 
     These are mounting and contact law; notes on measured signals and joints; warnings of its joints, of values that are
@@ -320,10 +307,10 @@ def print_study_notes(path: Path, study: studies.Study) -> None:
         say(f"note: {note}")
     joint2 = study.operation.joint2
     axial = [joint.shaft.axial for joint in ([joint2] if joint2 else study.joints)]
-    command = mounting.with_free_shaft(str(path), path.stem, study.joint)
-    if note := mounting.note_on_shafts(study.tolerances, axial, study.mechanism, command):
+    command = library.mounting.with_free_shaft(str(path), path.stem, study.joint)
+    if note := library.mounting.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
     print_warnings_of_joint2(path, study)
-    for fault in assumptions.warnings(study):
+    for fault in library.assumptions.warnings(study):
         warn(f"warning: {fault}")

@@ -64,14 +64,11 @@ class Counts(NamedTuple):
         def count(*states: Status) -> int:
             return int(np.count_nonzero(np.isin(status, states)))
 
-        return Counts(
-            self.total,
-            self.done + len(status) - count(Status.PENDING),
-            self.unsettled + count(*UNSETTLED),
-            self.failed + count(*FAILED),
-            self.not_resolved + count(Status.NOT_RESOLVED),
-            self.points,
-            self.noun,
+        return self._replace(
+            done=self.done + len(status) - count(Status.PENDING),
+            unsettled=self.unsettled + count(*UNSETTLED),
+            failed=self.failed + count(*FAILED),
+            not_resolved=self.not_resolved + count(Status.NOT_RESOLVED),
         )
 
 

@@ -1,7 +1,8 @@
-"""Modules of other packages that few commands need or that import slowly, imported when first used."""
+"""Imports when first used: modules that few commands need or that import slowly, and names of a package."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,17 @@ class Late:
             raise AttributeError(attribute)
         module = import_module(self._name)
         return getattr(module, attribute) if hasattr(module, attribute) else import_module(f"{self._name}.{attribute}")
+
+
+def names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package (PEP 562) whose names are imported from their modules when first used."""
+
+    def find(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(homes[name]), name)
+
+    return find
 
 
 if TYPE_CHECKING:

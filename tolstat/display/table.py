@@ -24,10 +24,6 @@ _LEAST = 12
 """Least width of a column of words that is folded."""
 
 
-def _always(_: Rows) -> bool:
-    return True
-
-
 def has(name: str) -> Callable[[Rows], bool]:
     """`Column.shown` of a column that is shown if any row has a value, not NaN, of this name."""
     return lambda rows: any(name in row and row[name] is not None and row[name] == row[name] for row in rows)
@@ -58,7 +54,7 @@ class Column(NamedTuple):
     head: str
     cell: Callable[[Row], str]
     words: bool = False
-    shown: Callable[[Rows], bool] = _always
+    shown: Callable[[Rows], bool] = lambda rows: True
     rank: int = 0
 
 

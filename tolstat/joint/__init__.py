@@ -5,8 +5,9 @@ Names are imported when first used: a worker process needs none of them.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from tolstat.common import late
 
 if TYPE_CHECKING:
     from tolstat.joint.bearing import Bearing as Bearing
@@ -28,22 +29,15 @@ if TYPE_CHECKING:
     from tolstat.joint.reading import varied as varied
     from tolstat.joint.shaft import DriveShaft as DriveShaft
 
+_OF_OPERATION = ("MEANS", "SPLINE", "Operation", "OperationOfLinkage", "OperationOfShaft", "joints_of", "mechanism_of")
 _HOMES = {
-    "bearing": ("Bearing",),
-    "linkage": ("Linkage",),
-    "model": ("affecting_results", "affects_results", "Joint"),
-    "operation": (
-        *("MEANS", "SPLINE", "Operation", "OperationOfLinkage", "OperationOfShaft"),
-        *("joints_of", "mechanism_of"),
-    ),
-    "perturbation": ("nominal_errors", "operating", "perturb"),
-    "reading": ("load", "varied"),
-    "shaft": ("DriveShaft",),
+    "Bearing": "bearing",
+    "DriveShaft": "shaft",
+    "Linkage": "linkage",
+    **dict.fromkeys(("affecting_results", "affects_results", "Joint"), "model"),
+    **dict.fromkeys(_OF_OPERATION, "operation"),
+    **dict.fromkeys(("nominal_errors", "operating", "perturb"), "perturbation"),
+    **dict.fromkeys(("load", "varied"), "reading"),
 }
 
-
-def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(f"tolstat.joint.{home}"), name)
-    raise AttributeError(f"module 'tolstat.joint' has no attribute {name!r}")
+__getattr__ = late.names(__name__, {name: f"{__name__}.{module}" for name, module in _HOMES.items()})

@@ -84,7 +84,8 @@ def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
     def value(joint: Any) -> float:
         arm = joint.arm
         if arm.d is None:
-            return material.rectangle(arm.width, arm.depth)[index]
+            w, d = float(arm.width), float(arm.depth)
+            return (w * d, w * d**3 / 12.0, d * w**3 / 12.0)[index]
         A, J = material.circle(arm.d)
         return (A, J, J)[index]
 
@@ -145,7 +146,7 @@ DERIVED: dict[str, Rule] = {
     "material.G": Rule(
         ("material.E", "material.nu"),
         "E/(2 (1 + nu))",
-        lambda j: material.shear_modulus(j.material.E, j.material.nu),
+        lambda j: 0.5 * j.material.E / (1.0 + j.material.nu),
         "Pa",
     ),
     "pin.A": Rule(("pin.d",), "pi d^2/4", lambda j: material.circle(j.pin.d)[0], "m^2"),

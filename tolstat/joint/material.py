@@ -140,20 +140,10 @@ def contact_damping(xi: float, mass: float, *, length: float, A: float, J: float
     return 2.0 * xi * mass * omega
 
 
-def shear_modulus(E: float, nu: float) -> float:
-    """Shear modulus E/(2 (1 + nu)) of an isotropic material of Young's modulus `E`, both in Pa."""
-    return 0.5 * E / (1.0 + nu)
-
-
 def circle(d: float) -> tuple[float, float]:
     """Area pi d^2/4 (m^2) and area moment pi d^4/64 (m^4) of a circle of diameter `d` (m)."""
     squared = d * d
     return math.pi / 4.0 * squared, math.pi / 64.0 * squared * squared
-
-
-def rectangle(width: float, depth: float) -> tuple[float, float, float]:
-    """Area (m^2) and area moments (m^4) of a rectangle: for bending along `depth`, and along `width` (m)."""
-    return width * depth, width * depth**3 / 12.0, depth * width**3 / 12.0
 
 
 def crossed_cylinders(rho: float, d: float, length: float) -> tuple[float, tuple[float, float, float]]:

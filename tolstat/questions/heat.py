@@ -25,12 +25,8 @@ def _cell(key: str) -> Cell:
     return cell
 
 
-def _has_points(rows: Rows) -> bool:
-    return any(row["point"] for row in rows)
-
-
 COLUMNS = (
-    Column("operating point", word("point"), shown=_has_points),
+    Column("operating point", word("point"), shown=lambda rows: any(row["point"] for row in rows)),
     Column("of", word("of")),
     Column("nominal joint", _cell("nominal"), shown=has("nominal")),
     Column("median", _cell("median")),

@@ -5,4 +5,6 @@ from tolstat.store.result_file import ResultFile, viewed
 from tolstat.store.view import View
 from tolstat.store.writer import Writer
 
-__all__ = ["Reader", "ResultFile", "View", "Writer", "viewed"]
+__all__ = ["Reader", "ResultFile", "View", "Writer", "open", "viewed"]
+
+open = ResultFile.open

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.design import Design, Independent, Listed, Looked
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import read_section, validate
+from tolstat.common.strict import validate
 from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
 from tolstat.joint import MEANS, SPLINE, Joint, Operation, OperationOfLinkage, operating, perturb, varied
@@ -260,13 +260,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     return _at_point(store, load(source, n=n, text=text, joint=joint, joint2=joint2))
 
 
-def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
-    """Whether a section of a file's study, as it is written, has one of some keys; the study itself is not read."""
-    return _has_key(read_section(store.path, store.study_text, section), keys)
-
-
-def _has_key(table: Mapping[str, Any], keys: Collection[str]) -> bool:
-    return any(key in keys or (isinstance(inner, Mapping) and _has_key(inner, keys)) for key, inner in table.items())
+def mentions(table: Mapping[str, Any], keys: Collection[str]) -> bool:
+    """Whether a section of a study, as it is written, has one of some keys, at any depth."""
+    return any(key in keys or (isinstance(inner, Mapping) and mentions(inner, keys)) for key, inner in table.items())
 
 
 def _at_point(store: Reader, study: Study) -> Study:

@@ -118,12 +118,6 @@ def _without_replaced(study: Study, text: str, paths: Collection[tuple[str, ...]
     return text
 
 
-def _keys_of_joint(text: str, study: Study, path: Sequence[str]) -> dict[str, Any]:
-    """Dotted keys of the joint at a key path of a text that differ from those of the study's, and their values."""
-    old, new = (leaves(_table(each, path)) for each in (study.text, text))
-    return {key: value for key, value in new.items() if old.get(key) != value}
-
-
 def _table(text: str, path: Sequence[str]) -> Mapping[str, Any]:
     table: Any = tomllib.loads(text)
     for key in path:
@@ -178,7 +172,8 @@ def read(study: Study, text: str) -> Study:
 
 def _changed(study: Study, text: str, joint: Joint, path: Sequence[str]) -> Joint:
     """Joint at a key path of a changed text: `joint` with the keys that the text changes."""
-    keys, name = _keys_of_joint(text, study, path), ".".join(path)
+    old, new = (leaves(_table(each, path)) for each in (study.text, text))
+    keys, name = {key: value for key, value in new.items() if old.get(key) != value}, ".".join(path)
     if "base" in keys:
         raise input_error(f"--set {name}.base", "is another joint", "run a study of its own, and compare both files")
     by_fit = [f"contact.{key}" for key in (*study.fit.diameters, "clearance")] if study.fit is not None else []

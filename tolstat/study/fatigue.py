@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
-from tolstat.analysis.strength import Line
+from tolstat.analysis.strength import SNLine
 from tolstat.common import units
 from tolstat.common.channels import FORCES_AND_TORQUES, WORST, Channel, channels, components, planes, unit_of
 from tolstat.common.errors import gather, input_error
@@ -114,14 +114,14 @@ class StressPointEntry(Strict):
         return tuple(places)
 
     @property
-    def line(self) -> Line:
+    def line(self) -> SNLine:
         """S–N line with all that follows from other keys."""
         k_2 = 2.0 * self.k - 1.0 if self.k_2 is None else self.k_2
         size = 2.0 * self.S_aD if self.S_aD is not None else self.S_D
         scatter = self.T_N ** (1.0 / self.k) if self.T_N is not None else self.T_S
         assert size is not None
         assert scatter is not None
-        return Line(self.k, k_2, self.N_D, size, scatter, self.D_c, self.M, self.R)
+        return SNLine(self.k, k_2, self.N_D, size, scatter, self.D_c, self.M, self.R)
 
 
 class StressPoint(NamedTuple):
@@ -136,14 +136,14 @@ class StressPoint(NamedTuple):
     per_load : tuple of tuple of float
         Stress per load component along e, t, z, three forces, 1/m^2, and three torques, 1/m^3: at one place or, of a
         round section, at several around it, of which the part fails at the worst.
-    line : Line
+    line : SNLine
         S–N line.
     """
 
     name: str
     bushing: str
     per_load: tuple[tuple[float, ...], ...]
-    line: Line
+    line: SNLine
 
 
 class SequenceEntry(Strict):
@@ -229,7 +229,7 @@ class Fatigue:
     reference_cycles : float
         Number of cycles that the damage-equivalent loads refer to.
     lines : dict
-        Name of a component or direction to (m, S0, N0) of its S–N line; S0 a range, N or N m.
+        S–N lines by name of a component or direction.
     starts : float
         Starts from standstill in the service life.
     points : tuple of StressPoint
@@ -245,7 +245,7 @@ class Fatigue:
     required: bool = False
     hours: float = math.nan
     reference_cycles: float = 1e6
-    lines: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    lines: dict[str, SNLine] = field(default_factory=dict)
     starts: float = 0.0
     points: tuple[StressPoint, ...] = ()
     visits: tuple[str, ...] = ()
@@ -287,7 +287,7 @@ def read(file: Reading) -> Fatigue:
     """Read ``[fatigue]``."""
     table, settings = file.data.get("fatigue", {}), Settings()
     of_channels = table.get("line") if isinstance(table, Mapping) else None
-    lines: dict[str, tuple[float, float, float]] = {}
+    lines: dict[str, SNLine] = {}
     claims, names = Assignments(file.place, file.mechanism), [point.name for point in file.points or ()]
     with gather(file.faults):
         settings = file.model(Settings, table, "fatigue", mechanism=file.mechanism)
@@ -307,7 +307,7 @@ def read(file: Reading) -> Fatigue:
             value = quantity(size, unit_of(selected[0], file.mechanism), file.place)
             if value <= 0:
                 file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
-            lines |= dict.fromkeys(selected, (line.m, value, line.N0))
+            lines |= dict.fromkeys(selected, SNLine(line.m, line.m, line.N0, value))
     points = []
     for name, point in settings.point.items():
         bushings = select(point.bushing, kinds_of(file.mechanism)["F"].places)

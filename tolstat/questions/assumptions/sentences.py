@@ -10,6 +10,7 @@ import numpy as np
 
 from tolstat.analysis import binomial
 from tolstat.common.counts import POWER
+from tolstat.common.strict import read_section
 from tolstat.display import table, text
 from tolstat.display.verdict import WORDS
 from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
@@ -106,7 +107,8 @@ def of_parts(view: View, standing: Standing | None) -> str:
     ``10 parts measured: their spread is known to −27 … +65 %; with the larger one 4.1 %``. Of several entries the one
     with the largest share then, without joints of these the one with the fewest parts.
     """
-    if not mentions(view.store, KEYS_OF_PARTS, "tolerances"):  # the study is not read for the others
+    store = view.store
+    if not mentions(read_section(store.path, store.study_text, "tolerances"), KEYS_OF_PARTS):  # others are not read
         return ""
     shares = {row["keys"]: float(row["share"]) for row in standing.rows} if standing else {}
     each = []

@@ -314,7 +314,7 @@ def _apart(counted: counting.Counted) -> str:
 
 def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     """One sentence for each S–N line, with the names of its points."""
-    names: dict[strength.Line, list[str]] = {}
+    names: dict[strength.SNLine, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
     for line, points_of_line in names.items():

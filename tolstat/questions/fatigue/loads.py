@@ -124,7 +124,7 @@ def damages(loading: Counted, delivery: int = prediction.DELIVERY) -> Rows:
     lines, life = loading.settings.lines, loading.settings.revolutions
     sums = {
         channel: [
-            cycles.damage(part.of(channel).worst(line[0]), cycles.Line(*line), life)[:, 0]
+            cycles.damage(part.of(channel).worst(line.k), line, life)[:, 0]
             for part in (loading.cycles, loading.nominal)
         ]
         for channel, line in lines.items()
@@ -135,7 +135,8 @@ def damages(loading: Counted, delivery: int = prediction.DELIVERY) -> Rows:
     rows = []
     for channel, (damage, nominal) in sums.items():
         sample = Sample.of(damage, loading.status, loading.design)
-        row = {"channel": channel, **cycles.Line(*lines.get(channel, [np.nan] * 3))._asdict(), "nominal": only(nominal)}
+        m, _, N0, S0, *_ = lines.get(channel, [np.nan] * 4)
+        row = {"channel": channel, "m": m, "S0": S0, "N0": N0, "nominal": only(nominal)}
         row |= {"median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
         row |= prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery) | {"confidence": CONFIDENCE}
         rows.append(row)

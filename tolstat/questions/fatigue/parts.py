@@ -71,7 +71,7 @@ class Evaluated(NamedTuple):
     """Stress cycles of the joints at one point in the service life, and its S–N line."""
 
     collective: strength.Collective
-    line: strength.Line
+    line: strength.SNLine
 
 
 def part_failures(stressed: Counted, delivery: int = prediction.DELIVERY) -> Rows:
@@ -88,7 +88,7 @@ def part_failures(stressed: Counted, delivery: int = prediction.DELIVERY) -> Row
     -------
     sequence of mapping
         One row per point, and one for all of them if there are several (the strengths of two points are independent):
-        ``point``, ``bushing``, fields of `analysis.strength.Line` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
+        ``point``, ``bushing``, fields of `analysis.strength.SNLine` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
         (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
         ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints
         without a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal
@@ -148,16 +148,13 @@ def evaluated(cycles: Cycles, settings: Fatigue) -> list[Evaluated]:
     collectives, begin = [], 0
     for point in settings.points:
         end = begin + len(point.per_load)
-        places = [_in_service(cycles, place, point.line, settings.revolutions) for place in range(begin, end)]
-        collectives.append(Evaluated(strength.weakest(places, point.line), point.line))
+        places, line = [], point.line
+        for place in range(begin, end):
+            ranges = strength.at_ratio(cycles.ranges[:, place], cycles.means[:, place], line.M, line.R)
+            places.append(strength.sort_out(ranges, cycles.repeats[:, place] * settings.revolutions, line))
+        collectives.append(Evaluated(strength.weakest(places, line), line))
         begin = end
     return collectives
-
-
-def _in_service(cycles: Cycles, place: int, line: strength.Line, revolutions: float) -> strength.Collective:
-    """Cycles of the joints at one place in the service life."""
-    ranges = strength.at_ratio(cycles.ranges[:, place], cycles.means[:, place], line.M, line.R)
-    return strength.sort_out(ranges, cycles.repeats[:, place] * revolutions, line)
 
 
 def _damage(stressed: Counted, p: int, joints: Evaluated, nominal: Evaluated) -> dict[str, Any]:

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow  # compiles the kernels for another mechanism
 @pytest.mark.parametrize(
     ("name", "steps", "start", "way"),
     [
-        ("hinge_middle", 2880, 100.0, 8.0),
+        ("hinge_middle", 2880, 100.0, 2.0),
         ("fourbar", 2880, 100.0, 2.0),
         ("fourbar_tilt", 2880, 100.0, 2.0),
         ("bennett", 11520, 100.0, 2.0),

@@ -1,4 +1,4 @@
-"""Statics of a linkage of rigid members on elastic pins and eyes, pressed without clearance: a linear system an angle."""
+"""Statics of rigid members on elastic pins and eyes, pressed without clearance: a linear system at each angle."""
 
 from __future__ import annotations
 

@@ -21,11 +21,13 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes
 from tests.support.blocks import die
 from tolstat.campaign import pool
+from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import Work, WorkerDied
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile
+from tolstat.study import load
 
 pytest.importorskip("distributed")
 
@@ -81,6 +83,19 @@ def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) 
     assert counts.done == 40
     assert cluster.workers[0].poll() == -signal.SIGKILL
     assert datasets(path) == reference(tmp_path / "b.h5")
+
+
+@pytest.mark.slow
+def test_linkages_on_a_cluster_have_the_bytes_of_processes(tmp_path: Path) -> None:
+    """Their kernels are compiled for the mechanism in each worker."""
+    text = (Path(__file__).parents[2] / "studies" / "four_bar.toml").read_text(encoding="utf-8")
+    assert "n = 1000" in text
+    linkages = load(Path("four_bar.toml"), text=text.replace("n = 1000", "n = 24"))
+    here, there = tmp_path / "a.h5", tmp_path / "b.h5"
+    campaign.run(linkages, here, 2, 7)
+    counts = campaign.run(linkages, there, 2, 5, executor="dask")
+    assert (counts.done, counts.unsettled, counts.failed) == (25, 0, 0), "the nominal one is added"
+    assert datasets(there) == datasets(here)
 
 
 @pytest.mark.slow

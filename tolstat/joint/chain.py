@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from tolstat.common.errors import InputError, input_error
+from tolstat.common.late import interpolate
 from tolstat.joint.material import Array
 
 GROUND = "ground"
@@ -236,7 +236,7 @@ def _follow(loops: _Loops, driven: Array) -> Array:
         before = coarse[-1]
         coarse.append(_one(loops, guess, float(angle)))
     index = np.arange(len(driven))
-    found = np.asarray(CubicSpline(index[::steps], np.array(coarse))(index))
+    found = np.asarray(interpolate.CubicSpline(index[::steps], np.array(coarse))(index))
     found[:, 0] = driven
     return _closed(loops, found)
 

@@ -194,17 +194,13 @@ def lives_of(view: View) -> Lives:
 
 
 def turning_of(store: Reader) -> dict[str, FloatArray]:
-    """Equivalent load of each bearing (n, pins), ``omega`` (n,) and ``alpha`` (n, joints) of the joints of a file.
-
-    Linkages have no joints.
-    """
+    """Equivalent load of each bearing (n, pins), ``omega`` (n,), of Cardan joints ``alpha`` (n, joints), of a file."""
     operation = recorded.operating_points(store)
-    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
-    alpha = operation.get("alpha", np.empty((len(loads), 0)))[:, None]
+    alpha = [operation["alpha"]] if "alpha" in operation else []
     if store.mechanism.is_shaft:
-        deviation = store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"]
-        alpha = np.column_stack([alpha, store.operation.alphas[1] + deviation])
-    return {"equivalent_load": loads, "omega": operation["speed"], "alpha": alpha}
+        alpha.append(store.operation.alphas[1] + store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"])
+    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
+    return {"equivalent_load": loads, "omega": operation["speed"], "alpha": np.transpose(alpha)}
 
 
 def rated(

@@ -16,7 +16,8 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Sentence, Table
 from tolstat.joint import joints_of
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.questions.bearing_life.lives import HOUR, places_of, rated, turning_of
+from tolstat.questions.bearing_life.lives import places_of
+from tolstat.questions.bearing_life.rated import HOUR, rated, turning_of
 from tolstat.store.view import View
 from tolstat.study import Study
 
@@ -67,7 +68,7 @@ def parts(
     loads : mapping
         Loads of n joints, SI, (n,) each.
     turning : mapping
-        What the lives follow from, see `lives.turning_of`.
+        What the lives follow from, see `rated.turning_of`.
     labels : sequence of str
         Name of each joint, (n,). Of more than `MOST` joints the table shows those nearest to a limit.
     status : ndarray, (n,)
@@ -112,7 +113,7 @@ def lives(study: Study, turning: Mapping[str, FloatArray]) -> dict[str, FloatArr
     if len(complete) < len(bearings):
         return {}
     names = [f"life of {place}" for place in places_of(study.mechanism).values()]
-    return dict(zip(names, rated(complete, np.ones(1), [turning])[1].T, strict=True))
+    return dict(zip(names, rated(complete, np.ones(1), [turning]).hours.T, strict=True))
 
 
 def _verdict(names: Mapping[str, Sequence[str]], lacking: Sequence[str]) -> str:

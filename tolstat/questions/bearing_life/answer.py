@@ -96,8 +96,8 @@ def bearing_life(view: View) -> Answer:
     Answer
         Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``loads`` (see `load_rows`) and
         ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Lives are in hours. Facts
-        ``symbol`` of the life, ``critical_amplitude`` (rad), ``unrated``, ``short``, ``fretting`` and ``load_error``,
-        see `lives.Lives`.
+        ``symbol`` of the life, ``critical_amplitude`` (rad), ``used``, ``unrated``, ``short``, ``fretting`` and
+        ``load_error``, see `lives.Lives`.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def bearing_life(view: View) -> Answer:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         units = dict.fromkeys(list(contacts[0])[1:], "1")
         parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
-    names_of_facts = ("critical_amplitude", "unrated", "short", "fretting", "load_error")
+    names_of_facts = ("critical_amplitude", "used", "unrated", "short", "fretting", "load_error")
     facts: dict[str, Any] = {"symbol": lives.bearing.symbol} | {name: getattr(lives, name) for name in names_of_facts}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
@@ -265,6 +265,11 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
     if len(lives.duty) > 1:
         times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())
         yield f"over a duty cycle: {times} of the time; P: the constant load with the same life"
+        if np.isfinite([*lives.used.values()]).all():
+            used = sorted(lives.used.items(), key=lambda of: -of[1])
+            told = ", ".join(f"{text.percent(share)} at {point}" for point, share in used)
+            all_pins = f"all {text.in_words(len(lives.pins))}"
+            yield f"of the life of {all_pins} the operating points use up, on average of the joints: {told}"
     edge = "the rating knows no edge load: it takes the resultant force as spread along the needles"
     if contacts:
         row = contacts[-1]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tolstat.analysis import accuracy, rating_life
+from tolstat.analysis import accuracy
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
@@ -19,8 +18,9 @@ from tolstat.display import text
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing, joints_of
 from tolstat.joint.bearing import FOR_LIFE
+from tolstat.questions.bearing_life.rated import HOUR, rated, turning_of
 from tolstat.questions.shares import inapplicable, unusable, with_ends
-from tolstat.store import Reader, recorded
+from tolstat.store import recorded
 from tolstat.store.view import View
 
 JOINT, SHAFT = "joint", "shaft"
@@ -34,7 +34,6 @@ MOSTLY = 0.5
 """Share of a revolution above which a bearing counts as loaded in a mode."""
 LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
 """Contact mode of each way to load a bearing."""
-HOUR = 3600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +48,8 @@ class Lives:
         Section ``[bearing]`` of each joint that is simulated.
     duty : dict of str to float
         Share of the service time at each operating point; their sum is 1.
+    used : dict of str to float
+        Share of the life that each uses up, see `rated.Rated`, on average of the joints with a rating.
     pins : tuple of str
         Pins, which bearings are named by.
     loads : ndarray, shape (n, pins)
@@ -69,6 +70,7 @@ class Lives:
     view: View
     bearings: tuple[Bearing, ...]
     duty: Mapping[str, float]
+    used: Mapping[str, float]
     pins: tuple[str, ...]
     loads: FloatArray
     hours: FloatArray
@@ -170,7 +172,7 @@ def lives_of(view: View) -> Lives:
     view.check()
     bearings, duty, stores = _bearings(view), view.shares_of_time, [part.store for part in view.parts]
     pins = kinds(view.mechanism)["contact"].places
-    load, hours, small = rated(bearings, duty, [turning_of(store) for store in stores])
+    load, hours, used, small = rated(bearings, duty, [turning_of(store) for store in stores])
     unrated = np.asarray(small[1].all(axis=0))
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
@@ -181,6 +183,7 @@ def lives_of(view: View) -> Lives:
         view=view,
         bearings=bearings,
         duty=dict(zip(view.points, duty.tolist(), strict=True)),
+        used=dict(zip(view.points, _mean(used[:, skip:]).tolist(), strict=True)),
         pins=pins,
         loads=load[skip:],
         hours=hours[skip:],
@@ -193,60 +196,10 @@ def lives_of(view: View) -> Lives:
     )
 
 
-def turning_of(store: Reader) -> dict[str, FloatArray]:
-    """Equivalent load of each bearing (n, pins), ``omega`` (n,), of Cardan joints ``alpha`` (n, joints), of a file."""
-    operation = recorded.operating_points(store)
-    alpha = [operation["alpha"]] if "alpha" in operation else []
-    if store.mechanism.is_shaft:
-        alpha.append(store.operation.alphas[1] + store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"])
-    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
-    return {"equivalent_load": loads, "omega": operation["speed"], "alpha": np.transpose(alpha)}
-
-
-def rated(
-    bearings: Sequence[Bearing], duty: FloatArray, turning: Sequence[Mapping[str, FloatArray]]
-) -> tuple[FloatArray, FloatArray, list[NDArray[np.bool_]]]:
-    """Lives of joints by what they have at each operating point.
-
-    Parameters
-    ----------
-    bearings : sequence of Bearing
-        Bearing of the pins of each joint.
-    duty : ndarray, shape (points,)
-        Share of the service time at each operating point.
-    turning : sequence of mapping
-        Loads, speeds and misalignments at each operating point, see `turning_of`.
-
-    Returns
-    -------
-    load : ndarray, shape (n, pins)
-        Equivalent load over the duty cycle, N.
-    hours : ndarray, shape (n, places)
-        Life of each bearing, of each joint of a drive shaft, and of the whole, h; NaN without a rating.
-    small : list of ndarray, shape (points, n, pins)
-        Whether a bearing swings by less than its critical amplitude, and by less than `rating_life.FRETTING` of it.
-    """
-    loads = np.stack([each["equivalent_load"] for each in turning])
-    speeds = np.abs([each["omega"] for each in turning])[:, :, None]
-    joints = np.abs([each["alpha"] for each in turning])
-    pins = loads.shape[2] // joints.shape[2]
-    swings = np.repeat(joints, pins, axis=2)
-    critical, factor, C = (
-        np.repeat(np.array([getattr(bearing, name) for bearing in bearings], float), pins)
-        for name in ("critical_amplitude", "factor", "C")
-    )
-    hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
-    turns = hourly.sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.where(turns > 0.0, hourly / turns, duty[:, None, None])
-        largest = loads.max(axis=0)
-        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
-        load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        of_pins = factor * rating_life.basic_life(load, C) / turns
-    small = [np.asarray(swings < part * critical * (1.0 - 1e-9)) for part in (1.0, rating_life.FRETTING)]
-    of_pins[small[1].all(axis=0)] = np.nan
-    of_joints = np.split(of_pins, joints.shape[2], axis=1) if joints.shape[2] > 1 else []
-    return load, np.column_stack([of_pins, *map(rating_life.system_life, (*of_joints, of_pins))]), small
+def _mean(shares: FloatArray) -> FloatArray:
+    """Mean over the joints that have shares, (points,); NaN without any."""
+    known = shares[:, ~np.isnan(shares).any(axis=0)]
+    return np.asarray(known.mean(axis=1)) if known.size else np.full(len(shares), np.nan)
 
 
 def bearings_of(view: View) -> list[Bearing | None]:

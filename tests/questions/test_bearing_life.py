@@ -97,7 +97,7 @@ def test_a_duty_cycle_is_a_miner_sum_over_its_points():
     # turns an hour 0.75 600 60 4 15/360 and 0.25 100 60 4 30/360, twice the load at the second point
     damage = np.array([4500.0, 500.0 * 2.0 ** (10 / 3)])
     np.testing.assert_allclose(list(lives.used.values()), damage / damage.sum())
-    used = "of the life of all four the operating points use up, on average of the joints: 52.8 % at climb, 47.2 % at"
+    used = "share of the life of all bearings that each operating point uses up, mean of the joints: 52.8 % at climb"
     assert any(n.startswith(used) for n in said(duty()))
     assert any(n.startswith("over a duty cycle: 75 % at cruise, 25 % at climb") for n in said(duty()))
 
@@ -119,7 +119,7 @@ def test_a_bearing_without_load_at_one_point_lasts_by_the_other():
     np.testing.assert_allclose(lives_of(duty(loads=(1000.0, 0.0))).hours[:, 0], 1e6 * 22 ** (10 / 3) / 6000 / 0.75)
     assert np.isinf(lives_of(duty(loads=(0.0, 0.0))).hours).all()
     assert lives_of(duty(loads=(1000.0, 0.0))).used == {"cruise": 1.0, "climb": 0.0}
-    assert not any("use up" in note for note in said(duty(loads=(0.0, 0.0))))
+    assert not any("uses up" in note for note in said(duty(loads=(0.0, 0.0))))
 
 
 def swinging(**angles):

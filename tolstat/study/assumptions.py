@@ -56,7 +56,7 @@ def assumptions(study: Study) -> tuple[Assumption, ...]:
     """Assumptions that hold for the joint of a study: those of its joint file, those of the study, and measured parts.
 
     An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
-    Linkages have none of what they lack.
+    Of a linkage those that are about `_OF_CARDAN` alone are left out, too.
     """
     out = {*given(study), *(entry.name for entry in study.assumed)}
     of_joint = [entry for entry in study.joint.assumed if entry.name not in out]

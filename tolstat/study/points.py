@@ -165,7 +165,7 @@ def _of_mechanism(file: Reading, read: Operation | DrivenPoint, second: float | 
     """Operating point of the mechanism of the file; of ``[shaft]`` with joint 2 and its misalignment at this point."""
     if file.linkage is not None:
         own = {key: getattr(read, key) for key in DrivenPoint.model_fields}
-        if read.torque and not file.linkage.loaded:
+        if (read.torque or read.torque_orders) and not file.linkage.loaded:
             found, remedy = "has no effect: no member is loaded", 'write mechanism.loaded = "MEMBER", or remove it'
             raise input_error(f"{file.place}: operation.torque", found, remedy)
         return OperationOfLinkage.model_construct(None, **own, linkage=file.linkage)

@@ -268,8 +268,7 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
         if np.isfinite([*lives.used.values()]).all():
             used = sorted(lives.used.items(), key=lambda of: -of[1])
             told = ", ".join(f"{text.percent(share)} at {point}" for point, share in used)
-            all_pins = f"all {text.in_words(len(lives.pins))}"
-            yield f"of the life of {all_pins} the operating points use up, on average of the joints: {told}"
+            yield f"share of the life of all bearings that each operating point uses up, mean of the joints: {told}"
     edge = "the rating knows no edge load: it takes the resultant force as spread along the needles"
     if contacts:
         row = contacts[-1]

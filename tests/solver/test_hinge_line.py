@@ -21,10 +21,11 @@ HEIGHTS = np.array([-0.3, 0.0, 0.3])
 """Places of the hinges along the axis of the flap, m."""
 
 
-def beam(off: Array, gap: float, k: float, moment: float) -> Array:
-    """Forces of the hinges, N, on a rigid beam that a moment turns; `off`: of the hinges from a line, m.
+def beam(off: Array, gap: Array, k: Array, moment: float) -> Array:
+    """Forces of the hinges, N, on a rigid beam that a moment turns.
 
-    The linear complementarity problem by enumeration: each hinge bears on one side, on the other, or not at all.
+    The linear complementarity problem by enumeration: each hinge bears on one side, on the other, or not at all. Of
+    each hinge: `off` a line and `gap`, m; stiffness `k`, N/m.
     """
     for sides in product((-1.0, 0.0, 1.0), repeat=3):
         side, bears = np.array(sides), np.array(sides) != 0.0
@@ -32,7 +33,8 @@ def beam(off: Array, gap: float, k: float, moment: float) -> Array:
         if bears.sum() < 2:
             continue
         # force k (side gap - off - a - b height) of each hinge that bears; their sum is zero, their moment is given
-        a, b = np.linalg.solve(k * across @ across.T, k * across @ (side * gap - off)[bears] - [0.0, moment])
+        pressed = across * k[bears]
+        a, b = np.linalg.solve(pressed @ across.T, pressed @ (side * gap - off)[bears] - [0.0, moment])
         apart = off + a + b * HEIGHTS
         force = np.where(bears, k * (side * gap - apart), 0.0)
         if np.all(np.where(bears, apart * side >= gap, abs(apart) <= gap)):
@@ -54,24 +56,39 @@ def of_study(tmp_path: Path, *changes: tuple[str, str]) -> study.Study:
     return study.load(path)
 
 
-def test_hinges_carry_what_a_beam_on_springs_with_gaps_does(tmp_path: Path) -> None:
-    """The lower hinge carries the weight, too; two hinges alone carry W b/h each."""
-    one = of_study(tmp_path)
-    joint, flap = one.joint, one.operation.linkage.member["flap"]
+OTHER = """
+joint.pin = { d = "16 mm", l = "32 mm" }
+joint.contact = { D_P = "16 mm", clearance = "0.05 mm", k1u = "0 N/m^2", k2u = "1.5e8 N/m" }
+"""
+
+
+@pytest.mark.parametrize("middle", ["", OTHER])
+def test_hinges_carry_what_a_beam_on_springs_with_gaps_does(tmp_path: Path, middle: str) -> None:
+    """The lower hinge carries the weight, too, and each its pin; two hinges alone carry W b/h each.
+
+    All hinges are alike, or the middle one has a thicker, longer pin, more clearance, and a softer contact.
+    """
+    one = of_study(
+        tmp_path, ('faces = "none"\n\n[mechanism.pair.upper]', f'faces = "none"{middle}\n\n[mechanism.pair.upper]')
+    )
+    flap = one.operation.linkage.member["flap"]
+    each = joints.joints_of(one.joint, one.operation)
     off = np.array([-0.2, -0.06, 0.0, 0.02, 0.07, 0.15]) * 1e-3
     errors = joints.nominal_errors(len(off), one.mechanism)
     errors["middle_eye.offset_z"] = off  # along the line from the hinges to the mass centre
-    params = joints.perturb(joint, one.operation, errors)
+    params = joints.perturb(one.joint, one.operation, errors)
     result = simulate_rows(params, Options(), mechanism=one.mechanism).results
     assert np.isin(result["status"], [Status.OK, Status.STATIONARY]).all()
-    k = 1.0 / sum(1.0 / k for k in (joint.k_cross[1], joint.contact.k2u, joint.k_fork[2]))
-    moment, weight = -9.81 * flap.mass * flap.centre[0], 9.81 * (flap.mass + 3 * joint.arm.mass)
+    springs = np.array([(joint.k_cross[1], joint.contact.k2u, joint.k_fork[2]) for joint in each])
+    k, gap = 1.0 / (1.0 / springs).sum(axis=1), np.array([joint.contact.clearance for joint in each])
+    assert (len(set(k)), len(set(gap))) == ((2, 2) if middle else (1, 1))
+    moment, weight = -9.81 * flap.mass * flap.centre[0], 9.81 * (flap.mass + sum(joint.arm.mass for joint in each))
     pins = [i for i, bushing in enumerate(one.mechanism.bushings) if bushing.name.endswith("_pin")]
     for row, at in zip(result, off, strict=True):
-        across = beam(np.array([0.0, at, 0.0]), joint.contact.clearance, k, moment)
-        expected = np.hypot(across, [weight, 0.0, 0.0])
+        across = beam(np.array([0.0, at, 0.0]), gap, k, moment)
+        expected = np.hypot(across, 9.81 * np.array([joint.pin.mass for joint in each]) + [weight, 0.0, 0.0])
         np.testing.assert_allclose(row["F_max"][pins], expected, rtol=0, atol=1e-3 * expected.max())
-    alone = np.abs(beam(np.zeros(3), joint.contact.clearance, k, moment))
+    alone = np.abs(beam(np.zeros(3), gap, k, moment))
     np.testing.assert_allclose(alone, [-moment / 0.6, 0.0, -moment / 0.6], atol=1e-9)
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tolstat import study
 from tolstat.common.errors import InputError
+from tolstat.joint import nominal_errors, perturb
 
 STUDY = Path(__file__).parents[2] / "studies" / "four_bar.toml"
 TEXT = STUDY.read_text(encoding="utf-8")
@@ -25,6 +27,16 @@ NO_MEMBER = "mechanism.member.wheel: missing table: a pair names it"
     [
         (D, '[mechanism.pair.D]\npin = "ground"\neye = "wheel"\n', NO_MEMBER),
         (D, '[mechanism.pair.D]\npin = "rocker"\neye = "rocker"\n', "mechanism.pair.D: pin and eye are both of rocker"),
+        ("eye_t = [4, 3, 0]", 'joint.pin.d = "-3 mm"', "mechanism.pair.D.joint.pin.d: "),
+        ("eye_t = [4, 3, 0]", 'joint.pin.dia = "3 mm"', "mechanism.pair.D.joint.pin.dia: unknown key"),
+        ("eye_t = [4, 3, 0]", "joint.pin = 3", "mechanism.pair.D.joint.pin: "),
+        ("eye_t = [4, 3, 0]", 'joint.base = "pin25"', "mechanism.pair.D.joint.base: is nothing of a pin or eye"),
+        ("eye_t = [4, 3, 0]", 'joint.shaft.axial = "free"', "mechanism.pair.D.joint.shaft: is nothing of a pin or eye"),
+        (
+            "eye_t = [4, 3, 0]",
+            'clearance = "0.1 mm"\njoint.contact.clearance = "0.1 mm"',
+            "mechanism.pair.D.clearance: is given as joint.contact.clearance, too",
+        ),
         ("eye_t = [4, 3, 0]", "eye_t = [0, 0, 2]", "mechanism.pair.D.eye_t: lies along the axis of the pin"),
         ('member = "crank"', 'member = "wheel"', "mechanism.drive.member: 'wheel' is in no pair"),
         ('loaded = "rocker"', 'loaded = "crank"', "mechanism.loaded: 'crank' is no member that moves freely"),
@@ -66,6 +78,70 @@ def test_it_must_move_in_one_way(tmp_path: Path, pairs: str, found: str) -> None
     path.write_text(f"{first}{more}[operation]{rest.partition('[operation]')[2]}", encoding="utf-8")
     with pytest.raises(InputError, match=found):
         study.load(path)
+
+
+FIT = 'fit = { basic = "25 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+
+
+@pytest.mark.parametrize(
+    ("head", "own", "place", "found"),
+    [
+        ('base = "cirelli2021"', "joint.friction.mu = 0.2", "joint.friction", "the study's joint has none"),
+        ('base = "cirelli2021"', 'joint.thrust.k = "1e7 N/m"', "joint.thrust", "the study's joint has none"),
+        ('base = "pin25"', 'joint.contact.D_P = "20 mm"', "joint.contact.D_P", "set by tolerances.fit already"),
+    ],
+)
+def test_keys_of_a_pair_go_with_those_of_the_study(tmp_path: Path, head: str, own: str, place: str, found: str) -> None:
+    path = tmp_path / "study.toml"
+    text = TEXT.replace('base = "pin25"', head).replace("eye_t = [4, 3, 0]", own)
+    path.write_text(text.replace('"*_pin.clearance" =', f"{FIT}\n#"), encoding="utf-8")
+    with pytest.raises(InputError) as raised:
+        study.load(path)
+    (fault,) = (fault for fault in raised.value.faults if fault.place.endswith(place))
+    assert found in fault.found
+
+
+def test_a_pair_of_other_dimensions_has_those_of_a_joint_with_them(tmp_path: Path) -> None:
+    """Its parameters, and those of the other pairs, are those of the study in which all pins have these dimensions."""
+    own = 'pin = { d = "32 mm", l = "40 mm" }\njoint.contact = { clearance = "0.05 mm", z = "20 mm", law = "uniform" }'
+    of_all = f'base = "pin25"\ncross.R = "60 mm"\n{own}'.replace("joint.", "")
+    texts = (
+        TEXT,
+        TEXT.replace("eye_t = [4, 3, 0]", f"eye_t = [4, 3, 0]\njoint.{own}"),
+        TEXT.replace('base = "pin25"', of_all),
+    )
+    found = []
+    for number, text in enumerate(texts):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(text, encoding="utf-8")
+        one = study.load(path)
+        found.append(perturb(one.joint, one.operation, nominal_errors(1, one.mechanism))[0])
+    usual, mixed, other = found
+    mechanism = one.mechanism
+    for name, of in (
+        ("mass", mechanism.lump_kinds),
+        ("inertia", mechanism.lump_kinds),
+        ("k", mechanism.bushing_kinds),
+        ("c", mechanism.bushing_kinds),
+        ("clearance", [pair.kind for pair in mechanism.pairs]),
+        ("station_k1", mechanism.pair_kinds),
+        ("station_k3", mechanism.pair_kinds),
+        ("station_s", mechanism.pair_kinds),
+        ("c_d", mechanism.pair_kinds),
+    ):
+        for i, kind in enumerate(of):
+            expected = other if kind.startswith("D") else usual
+            np.testing.assert_array_equal(mixed[name][i], expected[name][i], err_msg=f"{name} of {kind}")
+    assert mixed["n_stations"].tolist() == [5, 5, 2]
+
+
+def test_a_value_that_a_pair_leaves_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    text = TEXT.replace('base = "pin25"', 'base = "pin25"\ncontact.D_P = "25 mm"')
+    path.write_text(text.replace("eye_t = [4, 3, 0]", 'joint.pin.d = "20 mm"'), encoding="utf-8")
+    (fault,) = study.load(path).others["mechanism.pair.D.joint"].warnings()
+    assert fault.place == "contact.D_P"
+    assert "is inherited from [joint]" in fault.found
 
 
 def test_ideal_is_refused(tmp_path: Path) -> None:

@@ -289,11 +289,11 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[libra
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def print_warnings_of_joint2(path: Path, study: library.studies.Study) -> None:
-    """Print the warnings of joint 2 of a drive shaft, if it is another than joint 1; see `Joint.warnings`."""
-    if joint2 := study.operation.joint2:
-        for fault in joint2.warnings():
-            warn(f"warning: {path}: {replace(fault, place=f'shaft.joint2.{fault.place}')}")
+def print_warnings_of_others(path: Path, study: library.studies.Study) -> None:
+    """Print the warnings of joints beside that of the study, see `Study.others`."""
+    for place, joint in study.others.items():
+        for fault in joint.warnings():
+            warn(f"warning: {path}: {replace(fault, place=f'{place}.{fault.place}')}")
 
 
 def print_study_notes(path: Path, study: library.studies.Study) -> None:
@@ -311,6 +311,6 @@ def print_study_notes(path: Path, study: library.studies.Study) -> None:
     if note := library.mounting.note_on_shafts(study.tolerances, axial, study.mechanism, command):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
-    print_warnings_of_joint2(path, study)
+    print_warnings_of_others(path, study)
     for fault in library.assumptions.warnings(study):
         warn(f"warning: {fault}")

@@ -19,7 +19,7 @@ from tolstat.cli._shared import (
     opened,
     print_json,
     print_warnings,
-    print_warnings_of_joint2,
+    print_warnings_of_others,
     progress,
     say,
     told,
@@ -69,7 +69,7 @@ def simulate(
         for note in notes:
             say(note)
     print_warnings(case, [loaded.joint])
-    print_warnings_of_joint2(case, loaded)
+    print_warnings_of_others(case, loaded)
     say(f"{loaded.name}: {loaded.joint_in_words}")
     with progress("simulation"):
         result = library.replays.simulate_case(loaded)

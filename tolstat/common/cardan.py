@@ -57,7 +57,7 @@ def joint(name: str, prefix: str, input_shaft: Shaft, output_shaft: Shaft) -> Me
             Hinge(members["output"], members["cross"], members["output"], Y),
         ),
         pairs=tuple(
-            Pair(f"{prefix}pin{i}", f"{prefix}hole{hole}", members[fork[hole]], f"{prefix}bearing")
+            Pair(f"{prefix}pin{i}", f"{prefix}hole{hole}", members[fork[hole]], prefix)
             for i, hole in enumerate(HOLE_OF_PIN, 1)
         ),
         unknowns=tuple(name for name in (output_shaft.turns, output_shaft.slides) if name),

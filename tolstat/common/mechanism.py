@@ -147,13 +147,14 @@ class Hinge(NamedTuple):
 class Pair(NamedTuple):
     """Pin in a hole, by the names of their lumps, and the hinge between their members.
 
-    Pairs of one `kind` have the same stations, film, friction and faces.
+    Pairs of one `kind` have the same stations, film, friction and faces: those of one Cardan joint, whose names have
+    `kind` before them; of a linkage each has a kind of its own, its name.
     """
 
     pin: str
     hole: str
     hinge: str
-    kind: str = "bearing"
+    kind: str = ""
 
 
 class Face(NamedTuple):

@@ -67,6 +67,10 @@ class PairOf(Strict):
     """the same of the eye, whose beam lies along z = e x t; when left out: `t`"""
     clearance: Length | None = Field(default=None, examples=["0.02 mm"])
     """radial clearance; when left out: that of the joint's contact"""
+    joint: Annotated[dict[str, Any], Field(json_schema_extra={"x-table": "keys"})] = Field(
+        default={}, examples=[{"pin": {"d": "20 mm", "l": "35 mm"}, "contact": {"D_P": "20 mm"}}]
+    )
+    """keys of pin and eye in place of those of the study's joint"""
     faces: Literal["outer", "inner", "both", "none"] = "both"
     """ends of the pin that have a thrust face, where the joint has `thrust`"""
 
@@ -109,7 +113,7 @@ class ForceOn(Strict):
 
 
 class Linkage(Strict):
-    """A mechanism: members that pins join to a closed chain. Pins and eyes are those of the joint of the study."""
+    """A mechanism: members that pins join to a closed chain. Pins and eyes are those of the study's joint."""
 
     description: str = Field(default="", examples=["flap, drawing 815"])
     """text about the mechanism"""

@@ -27,9 +27,10 @@ from tolstat.common.mechanism import (
 )
 from tolstat.joint import material
 from tolstat.joint.chain import GROUND, Chain
-from tolstat.joint.linkage import ENDS, GRAVITY, Linkage, triad, unit
+from tolstat.joint.linkage import ENDS, GRAVITY, Linkage, PairOf, triad, unit
 from tolstat.joint.material import Array
-from tolstat.joint.model import Joint
+from tolstat.joint.model import Joint, merged
+from tolstat.joint.reading import with_own
 
 Table = NDArray[np.void]
 LINKAGE = "linkage"
@@ -38,6 +39,9 @@ PARTS = ("thrust", "friction")
 """What a linkage may have beside: thrust faces, friction of pins."""
 STIFF = 1e9
 """Torsional stiffness by which the turn of a driven member is given that has pairs in the ground, N m/rad."""
+
+WITHOUT_CROSS = {"cross": {"r_b": "1 m"}, "hub": {"mass": "1 kg", "inertia": ["1 kg*m^2"] * 3}}
+"""What pins of a pair have in place of a hub, which they meet in a joint: nothing of it is used."""
 
 
 @lru_cache(maxsize=64)
@@ -71,7 +75,7 @@ def _mechanism(text: str, parts: tuple[str, ...]) -> Mechanism:
             *[Bushing(held, driven, held, "drive", "drive")] * linkage.turns_alone,
         ),
         hinges=tuple(Hinge(name, pair.pin, pair.eye, GENERAL) for name, pair in pairs.items()),
-        pairs=tuple(Pair(f"{name}_pin", f"{name}_eye", name) for name in pairs),
+        pairs=tuple(Pair(f"{name}_pin", f"{name}_eye", name, name) for name in pairs),
         faces=tuple(
             Face(f"{name}_{word}", f"{name}_pin", end)
             for name, pair in pairs.items()
@@ -104,6 +108,17 @@ def frames(chain: Chain) -> dict[str, tuple[Array, Array]]:
     return found
 
 
+def joint_of(pair: PairOf, joint: Joint, place: str = "joint") -> Joint:
+    """Joint whose pins and arms are the pin and the eye of a pair: that of the study, with the keys of the pair.
+
+    Raises
+    ------
+    InputError
+        When they make no valid joint.
+    """
+    return with_own(joint, merged(WITHOUT_CROSS, pair.joint), place) if pair.joint else joint
+
+
 def write(params: Table, linkage: Linkage, joint: Joint, mechanism: Mechanism) -> dict[str, Array]:
     """Write parameters of all members, at factor 1 on E; return triads as `bodies.write`."""
     chain, at = linkage.chain, frames(linkage.chain)
@@ -121,16 +136,18 @@ def write(params: Table, linkage: Linkage, joint: Joint, mechanism: Mechanism) -
     of["R"] = 0.5 * chain.size
     of["weight"] = GRAVITY * unit(linkage.down) if linkage.down else np.zeros(3)
     triads, points = _lumps(linkage, mechanism)
-    bodies = {name: _body(linkage, joint, name) for name in triads}
+    own = {f"{name}_{side}": joint_of(pair, joint) for name, pair in linkage.pair.items() for side in ("pin", "eye")}
+    bodies = {name: _body(linkage, own, name) for name in triads}
     of["triad"] = [triads[lump.name] for lump in mechanism.lumps]
     of["mass"], of["inertia"] = ([bodies[name][i] for name in mechanism.lump_kinds] for i in (0, 1))
     of["at"] = [triads[name] @ points[name] for name in mechanism.lump_kinds]
     for bushing in mechanism.bushings:
         mass, inertia = bodies[bushing.lump]
-        k = _stiffness(joint, bushing.group, triads[bushing.lump])
+        of_pair = own.get(bushing.lump, joint)
+        k = _stiffness(of_pair, bushing.group, triads[bushing.lump])
         lever = points[bushing.lump] - points.get(bushing.base, np.zeros(3))
         of["k"].append(k)
-        of["c"].append(material.bushing_damping(k, mass, np.array(inertia), joint.bushing.xi))
+        of["c"].append(material.bushing_damping(k, mass, np.array(inertia), of_pair.bushing.xi))
         of["marker"].append(((0.0, 0.0, 0.0), triads[bushing.lump] @ lever))
     of["pull"], of["pull_at"] = np.zeros((2, len(linkage.force), 3))
     for i, force in enumerate(linkage.force.values()):
@@ -143,9 +160,9 @@ def write(params: Table, linkage: Linkage, joint: Joint, mechanism: Mechanism) -
 
 
 def added_clearances(linkage: Linkage, joint: Joint) -> list[float]:
-    """By how much the clearance of each pair is more than that of the joint's contact, m."""
-    usual = joint.contact.clearance
-    return [0.0 if pair.clearance is None else pair.clearance - usual for pair in linkage.pair.values()]
+    """By how much the clearance of each pair is more than that of its contact, m."""
+    each = [(pair.clearance, joint_of(pair, joint).contact.clearance) for pair in linkage.pair.values()]
+    return [0.0 if clearance is None else clearance - usual for clearance, usual in each]
 
 
 def _lumps(linkage: Linkage, mechanism: Mechanism) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -163,11 +180,11 @@ def _lumps(linkage: Linkage, mechanism: Mechanism) -> tuple[dict[str, Array], di
     return triads, points
 
 
-def _body(linkage: Linkage, joint: Joint, name: str) -> tuple[float, tuple[float, ...]]:
+def _body(linkage: Linkage, own: Mapping[str, Joint], name: str) -> tuple[float, tuple[float, ...]]:
     """Mass and moments of inertia of a lump."""
     if name in linkage.member:
         return linkage.member[name].mass, linkage.member[name].inertia
-    of = joint.pin if name.endswith("_pin") else joint.arm
+    of = own[name].pin if name.endswith("_pin") else own[name].arm
     return of.mass, of.inertia
 
 

@@ -95,14 +95,20 @@ SPLINE = "shaft.spline"
 
 
 def joints_of(joint: Joint, operation: Operation) -> tuple[Joint, ...]:
-    """Joints that are simulated together: `joint`, or joint 1 and joint 2 of a drive shaft."""
+    """Joints by the order of `Mechanism.pair_kinds`: `joint`, both of a drive shaft, or that of each pair."""
+    if isinstance(operation, OperationOfLinkage):
+        return tuple(linked.joint_of(pair, joint) for pair in operation.linkage.pair.values())
     shaft = shaft_of(operation)
     return (joint,) if shaft is None else (joint, operation.joint2 or joint)
 
 
-def having(name: str, joint: Joint, joint2: Joint | None) -> Joint:
-    """Joint that a name is about, ``joint2.pin1.offset_t``: `joint2` if that is not the same; else `joint`."""
-    return joint2 if joint2 is not None and name.startswith("joint2.") else joint
+def having(name: str, joint: Joint, operation: Operation) -> Joint:
+    """Joint of `joints_of` that a name is about, ``joint2.pin1.offset_t``, ``B_eye.tilt_t``; `joint` of other names."""
+    first = name.partition(".")[0]
+    if isinstance(operation, OperationOfLinkage):
+        pair = operation.linkage.pair.get(first.rpartition("_")[0])
+        return joint if pair is None else linked.joint_of(pair, joint)
+    return joints_of(joint, operation)[-1] if first == "joint2" else joint
 
 
 def mechanism_of(joint: Joint, operation: Operation) -> Mechanism:

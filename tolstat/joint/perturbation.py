@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.mechanism import Mechanism, prefixes, with_play
+from tolstat.common.mechanism import Mechanism, with_play
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.tables import FACTORS, blank_params, tables
 from tolstat.joint import bodies, linked, orders
@@ -91,7 +91,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """
     mechanism = mechanism_of(joint, operation)
     params = blank_params(len(errors), mechanism)
-    own = dict(zip(prefixes(mechanism) or ("",), joints_of(joint, operation), strict=True))
+    own = dict(zip(mechanism.pair_kinds, joints_of(joint, operation), strict=True))
     for k, each in enumerate(own.values()):
         for name, value in _of_pairs(each).items():
             params[name][:, k] = value
@@ -120,7 +120,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params["c"] *= np.sqrt(factor)[:, None, None]
     held = {}
     for i, (pin, hole, _, kind) in enumerate(mechanism.pairs):
-        held[pin] = own[kind.removesuffix("bearing")]
+        held[pin] = own[kind]
         params["pin_point"][:, i], params["pin_axis"][:, i] = axis(errors, pin, triads[pin])
         params["hole_point"][:, i], params["hole_axis"][:, i] = axis(errors, hole, triads[hole])
         deviations = (errors[f"{hole}.diameter"], errors[f"{pin}.diameter"], errors[f"{pin}.clearance"] + slack[i])

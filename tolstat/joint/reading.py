@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import json
 import math
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -134,9 +135,14 @@ def faults_of_assumed(
             try:
                 with_keys(data, of_study, value, at)
             except InputError as error:
-                for fault in error.faults:
-                    key = fault.place.removeprefix(f"{at}: ")
-                    yield Fault(f"{at}.{key}" if key != fault.place else at, fault.found, fault.remedy)
+                yield from _under(at, error.faults)
+
+
+def _under(at: str, faults: Iterable[Fault]) -> Iterator[Fault]:
+    """Faults with the place `at` as the table that their keys are in."""
+    for fault in faults:
+        key = fault.place.removeprefix(f"{at}: ")
+        yield Fault(f"{at}.{key}" if key != fault.place else at, fault.found, fault.remedy)
 
 
 def with_keys(data: Mapping[str, Any], of_study: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
@@ -157,6 +163,38 @@ def with_keys(data: Mapping[str, Any], of_study: Mapping[str, Any], keys: Mappin
         When the keys make no valid joint.
     """
     return strict.validate(Joint, overridden(data, laid_over(of_study, keys)), place, examples=examples())
+
+
+def with_own(joint: Joint, keys: Mapping[str, Any], place: str = "joint") -> Joint:
+    """Joint with some keys of another, and all that follows from them computed anew; it warns of values that stay.
+
+    Parameters
+    ----------
+    joint : Joint
+        The other.
+    keys : mapping
+        Nested, as a file writes them.
+    place : str
+        Key path of the keys, for faults.
+
+    Raises
+    ------
+    InputError
+        When the keys make no valid joint.
+    """
+    return _with_own(json.dumps(joint.given("json")), json.dumps(keys), place)
+
+
+@lru_cache(maxsize=256)
+def _with_own(text: str, own: str, place: str) -> Joint:
+    data, keys = json.loads(text), json.loads(own)
+    try:
+        joint = with_keys(data, {}, keys, place)
+    except InputError as error:
+        raise InputError([*_under(place, error.faults)]) from error
+    given, others = leaves(keys).keys(), leaves(data)
+    joint.remember(_inherited(joint, given, others, derived.replaced(given, others), Path("[joint]")), {})
+    return joint
 
 
 @cache

@@ -256,7 +256,7 @@ def _idle_ends(study: Study) -> Iterator[Fault]:
 
 def _contact(study: Study, name: str) -> Contact:
     """Contact of the joint that a name is about."""
-    return having(name, study.joint, study.operation.joint2).contact
+    return having(name, study.joint, study.operation).contact
 
 
 def _wide_bands(study: Study) -> Iterator[Fault]:

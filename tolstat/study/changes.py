@@ -22,7 +22,7 @@ from tolstat.joint.derived import replaced
 from tolstat.joint.model import leaves, merged
 from tolstat.joint.reading import with_keys
 from tolstat.study import rewriting, scaling, selection, widths
-from tolstat.study.file import BESIDE_FIT, SECTIONS, load
+from tolstat.study.file import SECTIONS, load
 from tolstat.study.scaling import REPLACED_KEYS
 from tolstat.study.selection import halves, toleranced_units
 from tolstat.study.study import Study
@@ -179,7 +179,7 @@ def _changed(study: Study, text: str, joint: Joint, path: Sequence[str]) -> Join
     by_fit = [f"contact.{key}" for key in (*study.fit.diameters, "clearance")] if study.fit is not None else []
     still = study.fit is not None and fits.KEY in tomllib.loads(text)["tolerances"]
     if still and (twice := [key for key in by_fit if key in keys]):
-        raise InputError([Fault(f"--set {name}.{key}", *BESIDE_FIT) for key in twice])
+        raise InputError([Fault(f"--set {name}.{key}", *fits.BESIDE) for key in twice])
     if not keys or keys.keys() <= set(by_fit):
         return joint
     over = {key: value for key, value in _table(text, path).items() if key != "base"}

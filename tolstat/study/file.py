@@ -38,8 +38,6 @@ SECTIONS = (
     *("fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
-BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
-"""Fault and remedy of a diameter."""
 SCATTER = ("tolerances", "correlation", "errors")
 """Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {"sweep": ("sweep", "errors"), "cases": ("case", "grid", "variant")}
@@ -90,7 +88,7 @@ def _with_diameters(file: Reading, keys: Mapping[str, Any], section: str) -> dic
         return merged(keys, {"contact": diameters})
     twice = [key for key in (*diameters, "clearance") if key in contact]
     for key in twice:
-        file.fault(f"{section}.contact.{key}", *BESIDE_FIT)
+        file.fault(f"{section}.contact.{key}", *fits.BESIDE)
     return {**keys, "contact": merged({k: v for k, v in contact.items() if k not in twice}, diameters)}
 
 
@@ -105,7 +103,7 @@ def _assumed(file: Reading) -> tuple[Assumed, ...]:
     for number, entry in enumerate(entries if file.fit else []):
         for n, value in enumerate(entry.values):
             for key in (key for key in leaves(value) if key in BEARING):
-                file.fault(f"assumed[{number}].values[{n}].{key}", *BESIDE_FIT)
+                file.fault(f"assumed[{number}].values[{n}].{key}", *fits.BESIDE)
     return tuple(entries)
 
 

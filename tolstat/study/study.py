@@ -22,6 +22,7 @@ from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.toml_lines import KeyPath
 from tolstat.common.wording import Wording, row_of
 from tolstat.joint import SPLINE, Joint, Operation, OperationOfLinkage, affecting_results, mechanism_of
+from tolstat.joint.linked import joint_of
 from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
 from tolstat.study import mounting
@@ -231,6 +232,15 @@ class Study:
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
         return self._different.joints if self._different else (self.joint,)
+
+    @property
+    def others(self) -> dict[str, Joint]:
+        """Joints with keys of their own beside `joint`, by the key path of these: joint 2, and those of pairs."""
+        operation = self.operation
+        if isinstance(operation, OperationOfLinkage):
+            own = {name: pair for name, pair in operation.linkage.pair.items() if pair.joint}
+            return {f"mechanism.pair.{name}.joint": joint_of(pair, self.joint) for name, pair in own.items()}
+        return {"shaft.joint2": operation.joint2} if operation.joint2 else {}
 
     @property
     def solvers(self) -> tuple[Solver, ...]:

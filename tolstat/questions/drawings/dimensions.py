@@ -20,6 +20,7 @@ from tolstat.joint import (
     perturb,
 )
 from tolstat.joint.ideal import ratio_of_all
+from tolstat.joint.model import leaves
 from tolstat.study.points import Point
 
 ARRANGEMENTS = {"Z": "the outer shafts point the same way", "W": "the shaft bends the same way at both joints"}
@@ -107,6 +108,10 @@ def _of_linkage(linkage: Linkage) -> Iterator[Line]:
     for name, force in linkage.force.items():
         way = "turns with it" if force.turns else "keeps its direction"
         yield f"force {name}", f"{np.linalg.norm(force.force):.4g} N on {force.member}", way
+    for name, pair in linkage.pair.items():
+        own = {} if pair.clearance is None else {"clearance": _mm(pair.clearance)}
+        if own := own | leaves(pair.joint):
+            yield f"pair {name}", ", ".join(f"{key} {value}" for key, value in own.items()), "its own"
     for name, (low, high) in chain.ranges().items():
         yield name, f"{_deg(low)} to {_deg(high)}", "angle in the member before it, in a period"
 

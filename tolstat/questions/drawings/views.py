@@ -19,6 +19,7 @@ from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
 from tolstat.joint import Joint, Operation, bodies, mechanism_of, nominal_errors, perturb, perturbation
+from tolstat.joint.contact import Contact
 from tolstat.joint.operation import having
 
 Array = NDArray[np.float64]
@@ -61,19 +62,21 @@ AT_REST = Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0)
 class Feature(NamedTuple):
     """A pin or hole with its errors: diameter, shift of its axis from the ideal middle, direction of the axis.
 
-    Lengths in m; the vectors, shape (3,), are along e, t, z; without errors the axis is (1, 0, 0).
+    Lengths in m; the vectors, shape (3,), are along e, t, z; without errors the axis is (1, 0, 0). `contact` has the
+    nominal diameter of the pin, and the length of both.
     """
 
     name: str
     diameter: float
     point: Array
     axis: Array
+    contact: Contact
 
-    def ends(self, length: float, factor: float = 1.0) -> Array:
-        """Ends of the axis, (2, 3), at -length/2 and length/2 along e, the deviation from the ideal axis enlarged."""
+    def ends(self, factor: float = 1.0) -> Array:
+        """Ends of the axis, (2, 3), at -z/2 and z/2 along e, the deviation from the ideal axis enlarged."""
         ideal = np.eye(3)[0]
         along = ideal + factor * (self.axis / self.axis[0] - ideal)
-        return np.outer((-0.5 * length, 0.5 * length), along) + factor * self.point
+        return np.outer((-0.5 * self.contact.z, 0.5 * self.contact.z), along) + factor * self.point
 
 
 Pair = tuple[Feature, Feature]
@@ -94,18 +97,20 @@ def pairs(joint: Joint, operation: Operation, errors: NDArray[np.void]) -> dict[
     errors : ndarray, shape (1,), dtype ERROR
         Its errors.
     """
-    par, found = perturb(joint, operation, errors)[0], dict[str, list[Pair]]()
-    for i, pair in enumerate(mechanism_of(joint, operation).pairs):
-        thick = having(pair.pin, joint, operation.joint2).contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
+    mechanism, found = mechanism_of(joint, operation), dict[str, list[Pair]]()
+    par = perturb(joint, operation, errors)[0]
+    for i, pair in enumerate(mechanism.pairs):
+        contact = having(pair.pin, joint, operation).contact
+        thick = contact.D_P + float(errors[f"{pair.pin}.diameter"][0])
         wide = thick + 2.0 * float(par["clearance"][i])
-        both = _feature(errors, pair.pin, thick), _feature(errors, pair.hole, wide)
-        found.setdefault(pair.kind.removesuffix("bearing").rstrip("."), []).append(both)
+        both = _feature(errors, pair.pin, thick, contact), _feature(errors, pair.hole, wide, contact)
+        found.setdefault(pair.kind.rstrip(".") if mechanism.cardan else "", []).append(both)
     return found
 
 
-def _feature(errors: NDArray[np.void], name: str, diameter: float) -> Feature:
+def _feature(errors: NDArray[np.void], name: str, diameter: float, contact: Contact) -> Feature:
     point, axis = perturbation.axis(errors, name, np.eye(3))
-    return Feature(name, diameter, point[0], axis[0])
+    return Feature(name, diameter, point[0], axis[0], contact)
 
 
 def positive(joint: Joint, kind: str) -> Pair:
@@ -165,7 +170,7 @@ def kinds_of_errors(joint: Joint) -> Panel:
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
         both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}
         cells.append((kind, meaning, view, both))
-    draw = partial(_cells, joint=joint, cells=cells, factor=1.0)
+    draw = partial(_cells, cells=cells, factor=1.0)
     return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 3 * HEIGHT), bare=True)
 
 
@@ -174,21 +179,20 @@ def errors_of(joint: Joint, operation: Operation, errors: NDArray[np.void], titl
     panels = []
     for name, both in pairs(joint, operation, errors).items():
         of, suffix = (f"{name}: ", f"-{name}") if name else ("", "")
-        own = having(f"{name}.", joint, operation.joint2)
-        panels.append(_errors_of(own, both, f"{of}{title}", f"{key}{suffix}"))
+        panels.append(_errors_of(both, f"{of}{title}", f"{key}{suffix}"))
     return panels
 
 
-def _errors_of(joint: Joint, both: Sequence[Pair], title: str, key: str) -> Panel:
+def _errors_of(both: Sequence[Pair], title: str, key: str) -> Panel:
     """Errors of one joint, enlarged: pins in their holes, while the members that carry them are in their ideal place.
 
     Along a pin, the shift of its axis is enlarged: where pin and hole overlap, they would do so in this place. The
     largest error or clearance is drawn as a sixth to a quarter of the pin's size.
     """
-    z = joint.contact.z
-    moved = [abs(feature.ends(z) - feature.ends(z, 0.0)).max() for pair in both for feature in pair]
+    size = max(pin.contact.D_P + pin.contact.z for pin, _ in both)
+    moved = [abs(feature.ends() - feature.ends(0.0)).max() for pair in both for feature in pair]
     largest = max(*moved, *(0.5 * abs(hole.diameter - pin.diameter) for pin, hole in both))
-    factor = float(f"{0.08 * (joint.contact.D_P + z) / largest:.0e}") if largest > 0.0 else 1.0
+    factor = float(f"{0.08 * size / largest:.0e}") if largest > 0.0 else 1.0
     cells: list[Cell] = []
     for pair in both:
         gap = f"gap {5e5 * (pair[1].diameter - pair[0].diameter):.4g} µm, drawn × {factor:g}".replace("-", "−")
@@ -196,7 +200,7 @@ def _errors_of(joint: Joint, both: Sequence[Pair], title: str, key: str) -> Pane
             head, look = f"{pair[0].name} in {pair[1].name}, along {way}", {"alpha": 0.85}
             cells.append((head, gap, view, {f"along_{way}": (pair, look)}))
     description = f"Pins in their holes, errors and clearance enlarged {factor:g} times."
-    draw = partial(_cells, joint=joint, cells=cells, factor=factor)
+    draw = partial(_cells, cells=cells, factor=factor)
     return Panel(key, title, description, draw, (WIDTH, len(both) * HEIGHT), bare=True)
 
 
@@ -302,9 +306,10 @@ def _mark(ax: Axes, marked: Collection[str]) -> None:
             artist.set(**(line if artist in ax.lines else {"edgecolor": MARKED, "linewidth": 2.4}))
 
 
-def _cells(ax: Axes, joint: Joint, cells: Sequence[Cell], factor: float) -> None:
+def _cells(ax: Axes, cells: Sequence[Cell], factor: float) -> None:
     """Draw pins in their holes, two cells side by side, with the axes e, t, z."""
-    inch = max((1.0 + 2.0 * WALL) * joint.contact.D_H / 0.95, joint.contact.z / 0.36)
+    every = [feature.contact for *_, drawn in cells for pair, _ in drawn.values() for feature in pair]
+    inch = max(max((1.0 + 2.0 * WALL) * contact.D_H / 0.95, contact.z / 0.36) for contact in every)
     _frame(ax, 0.5 * WIDTH * inch, -HEIGHT * (len(cells) // 2) * inch, 0.0)
     for i, (head, words, view, drawn) in enumerate(cells):
         at = inch * np.array([(-0.85, 1.55)[i % 2], -HEIGHT * (i // 2) - 1.0])
@@ -312,14 +317,14 @@ def _cells(ax: Axes, joint: Joint, cells: Sequence[Cell], factor: float) -> None
         _label(ax, at, words, (-20.0, 42.0))
         _triad(ax, at - 1.05 * inch * X, np.eye(3), view, f"axes.{i}")
         for name, (pair, look) in drawn.items():
-            _pair(ax, joint, pair, at, view, name, factor, **look)
+            _pair(ax, pair, at, view, name, factor, **look)
 
 
-def _pair(ax: Axes, joint: Joint, pair: Pair, at: Array, view: Array, name: str, factor: float, **look: Any) -> None:
+def _pair(ax: Axes, pair: Pair, at: Array, view: Array, name: str, factor: float, **look: Any) -> None:
     """Draw a pin in its hole, middle without errors at a place; deviations from the nominal pin enlarged."""
-    D, across = joint.contact.D_P, None if factor == 1.0 else X  # enlarged tilts do not change widths
+    D, across = pair[0].contact.D_P, None if factor == 1.0 else X  # enlarged tilts do not change widths
     for feature in reversed(pair):
-        ends = at + feature.ends(joint.contact.z, factor) @ view.T
+        ends = at + feature.ends(factor) @ view.T
         half = 0.5 * (D + factor * (feature.diameter - D))
         walls = {".1": (-half, -half - WALL * D), ".2": (half, half + WALL * D)}
         for part, span in ({"": (-half, half)} if feature is pair[0] else walls).items():

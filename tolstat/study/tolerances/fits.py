@@ -28,6 +28,8 @@ from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
 KEY = "fit"
 PATH = ("tolerances", KEY)
 """Key of ``[tolerances]``, and its path."""
+BESIDE = ("is set by tolerances.fit already", "remove one of the two")
+"""Fault and remedy of a diameter."""
 STAND_IN = {"basic": "20 mm", "code": "H7/f7", "distribution": "normal"}
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}

@@ -327,12 +327,13 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
     read: dict[int, Toleranced] = {}
+    known = file.joint, file.operation
     for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
         item, names = table[number]
         models = []
         with gather(file.faults):
             for name in names:
-                reach = math.nan if file.joint is None else having(name, file.joint, file.joint2).cross.R
+                reach = having(name, *known).cross.R if None not in known else math.nan
                 site = Site(name, units[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
                 if _is_position([name]):
                     direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)

@@ -9,10 +9,12 @@ import pytest
 
 import tolstat
 from tests.support.environment import ROOT
+from tolstat.campaign import replay
 from tolstat.campaign.run import run
 from tolstat.campaign.work import Work
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.questions.change import simulate
+from tolstat.store import ResultFile, recorded
 from tolstat.study import load
 
 pytestmark = pytest.mark.slow
@@ -58,6 +60,29 @@ def test_a_hinge_with_more_play_carries_less(flaps: Path) -> None:
     (row,) = answer.frame("limits").to_dict("records")
     assert row["after_upper"] < row["before_lower"]
     assert list(answer.facts["differs"].values()) == [pytest.approx(1e-4)]
+
+
+def test_a_thinner_pin_of_one_hinge_is_a_change_of_the_same_mechanism(flaps: Path) -> None:
+    """A pin of half the diameter is a sixteenth as stiff: the middle hinge carries less of what is left to it."""
+    settings = ["mechanism.pair.middle.joint.pin.d=6 mm"]
+    simulate(flaps, Work(workers=1, tell=lambda _: None), settings, most=128)
+    with tolstat.open(flaps) as store:
+        (row,) = tolstat.change(store.view(), settings).frame("limits").to_dict("records")
+    assert row["after"] < row["before"]
+
+
+def test_variants_change_pins_but_keep_what_a_pair_has_of_its_own(tmp_path: Path) -> None:
+    """All hinges are loose in the second variant, but the lower one; replay computes it to the last bit."""
+    own = 'joint.contact = { clearance = "0.03 mm", law = "sliced", n_stations = 3 }'
+    middle = "\n[mechanism.pair.middle]"
+    head, _, _ = HINGES.replace(middle, f"{own}\n{middle}").partition("[tolerances]")
+    path = made(tmp_path, head + LISTED)
+    with ResultFile.open(path) as store:
+        clearances = recorded.parameters(store, np.arange(4))["clearance"]
+        assert replay.replay(store, 3).differences == []
+        assert recorded.in_words(store).endswith("contact laws sliced, uniform")
+    np.testing.assert_allclose(clearances[:2], 3e-5)
+    np.testing.assert_allclose(clearances[2:], [[3e-5, 5e-5, 5e-5]] * 2)
 
 
 @pytest.mark.parametrize(

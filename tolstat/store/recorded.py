@@ -17,7 +17,7 @@ from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
 from tolstat.joint import MEANS, SPLINE, Joint, Operation, OperationOfLinkage, operating, perturb, varied
 from tolstat.joint.derived import get
-from tolstat.joint.model import nested
+from tolstat.joint.model import leaves, nested
 from tolstat.joint.sections import RIGID, mounting_and_law
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import BLOCK, pick, store_error
@@ -136,6 +136,8 @@ def in_words(store: Reader) -> str:
     axial, laws = mountings(store)
     operation = next(iter(store.points.values())).operation
     if isinstance(operation, OperationOfLinkage):
+        own = [leaves(pair.joint) for pair in operation.linkage.pair.values()]
+        laws = [keys.get("contact.law", law) for law in laws for keys in own]
         return f"{operation.linkage.in_words}{mounting_and_law([], laws)}"
     return mounting_and_law(axial, laws)
 

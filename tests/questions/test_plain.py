@@ -16,7 +16,9 @@ import tolstat
 from tests.kernel.test_bearing_line import LINE
 from tests.kernel.test_bearing_line import parameters as of_line
 from tests.support import linkages, naive
+from tests.support.environment import ROOT
 from tests.support.mechanisms import triads
+from tolstat import study
 from tolstat.common.cardan import CARDAN
 from tolstat.common.mechanism import (
     ALONG_Z,
@@ -33,6 +35,7 @@ from tolstat.common.mechanism import (
 )
 from tolstat.common.tables import blank_params
 from tolstat.display import drawing
+from tolstat.joint import nominal_errors, perturb
 from tolstat.questions.drawings import plain
 from tolstat.questions.drawings.plain import MARKED, VIEWS, Frame
 
@@ -161,7 +164,7 @@ def test_what_is_marked_stands_out(params) -> None:
     bold = [text.get_text() for text in figure.findobj(Annotation) if text.get_fontweight() == "bold"]
     assert sorted(bold) == sorted(marked * 3)
     words = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
-    assert words == {"input", "cross", "output", "bushing", "pin in its hole"}
+    assert words == {"input", "cross", "output", "bushing", "pin"}
 
 
 def is_marked(line) -> bool:
@@ -205,3 +208,19 @@ def test_members_of_a_linkage_lie_where_the_twin_has_them() -> None:
         np.testing.assert_allclose(group[member.name].origin, origins[i], atol=1e-12)
     found, _ = drawn(plain.views(mechanism, row, group))
     assert found
+
+
+def test_a_linkage_is_drawn_as_it_is_and_as_it_moves() -> None:
+    """Lines go from the pins to the mass centre of their member; the crank's pin goes round in steps of 45 degrees."""
+    one = study.load(ROOT / "studies" / "four_bar.toml")
+    row = perturb(one.joint, one.operation, nominal_errors(1, one.mechanism)).view(np.recarray)[0]
+    found, figure = drawn(plain.views(one.mechanism, row, plain.frames(one.mechanism, row)))
+    for pin, ends in {"B_pin": [(80, 0), (0, 0)], "C_pin": [(400, 240), (490, 120)]}.items():
+        np.testing.assert_allclose(found[f"front.{pin}.line"].get_xydata()[[0, -1]], ends, atol=1e-6)
+    lines = [
+        line.get_xydata() for line in figure.axes[0].child_axes[2].lines if line.get_alpha() == plain.PALE["alpha"]
+    ]
+    ends = np.array([line[0] for line in lines if np.hypot(*line[-1]) < 1e-6 and np.hypot(*line[0]) > 1.0])
+    angles = np.degrees(np.arctan2(*ends.T[::-1])) % 360
+    np.testing.assert_allclose(np.sort(angles), np.arange(45, 360, 45), atol=1e-6)
+    np.testing.assert_allclose(np.hypot(*ends.T), 80, atol=1e-6)

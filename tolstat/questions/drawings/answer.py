@@ -35,6 +35,11 @@ PLAIN = (
     "mean input angle 0. The ends of shafts are sketched."
 )
 """Text below the plain picture of a mechanism."""
+OF_LINKAGE = (
+    "Lines go from pins and eyes to the mass centre of their member, or to the axis of a driven one without a pair in "
+    "the ground; without errors. Pale lines: every 45 deg of the input angle, of a swing eight times a period."
+)
+"""Text below the picture of a linkage."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
 """Text below the drawings of the worst joints."""
 NOTES = (
@@ -134,7 +139,7 @@ def drawings(view: View) -> Answer:
         drawn = chain.from_iterable(_joints(view, marked, next(iter(view.leading), "")).values())
         parts += [Panels([*drawn, kinds]), Sentence(LEGEND)]
     else:
-        parts += [Panels([_linkage(joint, operation, marked), kinds]), Sentence(PLAIN)]
+        parts += [Panels([_linkage(joint, operation, marked), kinds]), Sentence(OF_LINKAGE)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
     return Answer("drawings", "The joint and its errors, drawn", parts)
@@ -254,7 +259,7 @@ def draw_joint(joint: joints.Joint, at: float | joints.Operation, title: str = "
         Its parts have their names as ids in an SVG.
     """
     if isinstance(at, joints.OperationOfLinkage):
-        return drawing.sheet([_linkage(joint, at)], title or at.linkage.description, [PLAIN])
+        return drawing.sheet([_linkage(joint, at)], title or at.linkage.description, [OF_LINKAGE])
     if isinstance(at, joints.OperationOfShaft):
         each = [views.views(own, alpha) for own, alpha in zip(joints.joints_of(joint, at), at.alphas, strict=True)]
         named = [_named(panels, f"joint{number}.") for number, panels in enumerate(each, 1)]

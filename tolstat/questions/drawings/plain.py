@@ -1,11 +1,12 @@
 """Plain picture of any mechanism from its geometry: members as lines, pins in their holes as circles, three views.
 
-Everything is drawn at the mean input angle 0, without errors.
+Everything is drawn at the mean input angle 0, without errors; a mechanism whose members have places of their own in
+pale lines at other angles, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -30,10 +31,15 @@ LINES: tuple[Look, ...] = tuple(
     for colour, dash, width in zip((COLOURS[0], COLOURS[2], INK, COLOURS[3]), DASHES, (4.2, 3.2, 2.2, 1.6), strict=True)
 )
 """Looks of members: where lines coincide, each is seen beside or between the others."""
-PIN: Look = {"marker": "o", "ms": 9.0, "mfc": "none", "mec": INK, "mew": 1.3, "zorder": 4, "label": "pin in its hole"}
+PIN: Look = {"marker": "o", "ms": 9.0, "mfc": "none", "mec": INK, "mew": 1.3, "zorder": 4, "label": "pin"}
 BUSHING: Look = {"marker": "s", "ms": 4.5, "mfc": "white", "mec": INK, "mew": 0.9, "zorder": 3, "label": "bushing"}
 ON_LINES: Look = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
 NAME: Look = {"textcoords": "offset points", "ha": "center", "va": "center", "size": 8.0, "zorder": 5, "bbox": ON_LINES}
+PALE: Look = {"color": INK, "lw": 0.8, "alpha": 0.25, "zorder": 1.0, "label": "at other input angles"}
+PHASES = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)[1:]
+"""Other input angles at which members are drawn, rad."""
+FOOT = 0.25
+"""Length of a shaft that is sketched where members have places of their own, relative to R."""
 STRONG: Look = {"color": MARKED, "fontweight": "bold"}
 
 
@@ -72,10 +78,10 @@ class Part(NamedTuple):
         return place
 
 
-def frames(mechanism: Mechanism, row: Any) -> Group:
-    """Frames of the members by their ideal motion, at the mean input angle 0; `row`: record of PARAM."""
+def frames(mechanism: Mechanism, row: Any, phase: float = 0.0) -> Group:
+    """Frames of the members by their ideal motion, at a mean input angle (rad); `row`: record of PARAM."""
     work = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0]
-    ideal_motion(0.0, row, work)
+    ideal_motion(phase, row, work)
     if mechanism.placed:
         return {one.name: Frame(work.origin[i], work.attitude[i]) for i, one in enumerate(mechanism.members)}
     c, s = work.turned[0]
@@ -106,16 +112,19 @@ def views(mechanism: Mechanism, row: Any, group: Group, marked: Collection[str] 
         Names such as ``"cross1"``, ``"pin3"``, ``"output"``.
     """
     parts = _parts(mechanism, row, group)
-    span = np.ptp(np.concatenate([part.points for part in parts.values()]), axis=0)
+    phases = PHASES if mechanism.placed else ()
+    others = [part for phase in phases for part in _parts(mechanism, row, frames(mechanism, row, phase)).values()]
+    moved = [part.points for part in others if len(part.points) > 1]
+    span = np.ptp(np.concatenate([*moved, *(part.points for part in parts.values())]), axis=0)
     size = span + 0.5 * np.max(span)
     scale = (WIDTH - 2.0 * LEFT - 0.2) / (size[2] + size[0])
     title = "The mechanism in three views"
     pairs = ", ".join(f"{pair.pin} in {pair.hole}" for pair in mechanism.pairs)
     there = ", ".join(sorted(parts.keys() & set(marked)))
     words = f"{title} at the mean input angle 0: {pairs}.{f' Marked: {there}.' if there else ''}"
-    legend = 0.24 * -(-(len(group) + 2) // 3)
+    legend = 0.24 * -(-(len({part.member for part in parts.values()}) + 2 + bool(moved)) // 3)
     height = scale * (size[0] + size[1]) + 2.0 * (BELOW + ABOVE) + legend
-    draw = partial(_draw, parts=parts, size=size, scale=scale, height=height, marked=marked)
+    draw = partial(_draw, parts=parts, size=size, scale=scale, height=height, marked=marked, moved=moved)
     return Panel("plain", title, words, draw, (WIDTH, height), bare=True)
 
 
@@ -137,21 +146,22 @@ def _parts(mechanism: Mechanism, row: Any, group: Group) -> dict[str, Part]:
             feet[bushing.base].append(marker[2])
         drawn.append((bushing.name, bushing.lump, [at[bushing.lump], marker, end], BUSHING))
     for name, z in feet.items():
-        low, high = min(z, default=0.0), max(z, default=0.0)
-        ends = sorted((low - row.R * (low <= 0.0), high + row.R * (high >= 0.0)), key=abs)
+        low, high, foot = min(z, default=0.0), max(z, default=0.0), row.R * (FOOT if mechanism.placed else 1.0)
+        ends = sorted((low - foot * (low <= 0.0), high + foot * (high >= 0.0)), key=abs)
         drawn.append((name, name, [np.array([0.0, 0.0, end]) for end in ends], {}))
-    drawn += [(pair.pin, pair.pin, [at[pair.pin]], PIN) for pair in mechanism.pairs]
+    of_bushings = {name: points for name, _, points, _ in drawn}  # of a linkage they have the names of pins and eyes
+    drawn += [(pair.pin, pair.pin, of_bushings.get(pair.pin, [at[pair.pin]]), PIN) for pair in mechanism.pairs]
     return {
         name: Part(member[body], 1e3 * (group[member[body]].origin + points @ group[member[body]].attitude.T), look)
         for name, body, points, look in drawn
     }
 
 
-def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: float, **names: Any) -> None:
-    """Draw the views, of a size in mm and a scale in inches a mm, and above them the legend; `names` as in `_view`."""
+def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: float, **others: Any) -> None:
+    """Draw the views, of a size in mm and a scale in inches a mm, and above them the legend; `others` as in `_view`."""
     ax.axis("off")
     ax.set_box_aspect(height / WIDTH)
-    points = np.concatenate([part.points for part in parts.values()])
+    points = np.concatenate([*others["moved"], *(part.points for part in parts.values())])
     ends = 0.5 * (points.min(axis=0) + points.max(axis=0)) + np.multiply.outer((-0.5, 0.5), size)
     right_of, over = 2.0 * LEFT + scale * size[2], 2.0 * BELOW + ABOVE + scale * size[1]
     corners = ((LEFT, over), (LEFT, BELOW), (right_of, BELOW))
@@ -160,21 +170,25 @@ def _draw(ax: Axes, parts: dict[str, Part], size: Array, scale: float, height: f
         view = ax.inset_axes(box, xlim=ends[:, right], ylim=ends[:, up])
         view.set(xlabel=f"{'xyz'[right]} [mm]", ylabel=f"{'xyz'[up]} [mm]")
         view.set_title(title, fontsize=8.8)
-        _view(view, parts, title, **names)
+        _view(view, parts, title, **others)
     entries = {label: handle for handle, label in zip(*view.get_legend_handles_labels(), strict=True)}
     ax.legend(entries.values(), entries, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
 
 
-def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str]) -> None:
-    """Draw the parts in one view, with the names of pins and of what is marked."""
+def _view(view: Axes, parts: dict[str, Part], title: str, marked: Collection[str], moved: Sequence[Array]) -> None:
+    """Draw the parts in one view, with the names of pins and of what is marked; `moved`: lines at other angles, mm."""
+    for points in moved:
+        view.plot(*points[:, VIEWS[title]].T, **PALE)
     axes, members, names = list(VIEWS[title]), list[str](), dict[tuple[float, ...], list[str]]()
     reach = 0.2 * np.ptp(view.get_xlim()), 0.08 * np.ptp(view.get_ylim())
     for name, part in parts.items():
-        members += [part.member] * (part.member not in members)
-        line, sign = LINES[members.index(part.member) % 4] | {"label": part.member}, part.look
+        is_line = bool(np.ptp(part.points, axis=0).any())
+        members += [part.member] * (is_line and part.member not in members)
+        look: Look = LINES[members.index(part.member) % 4] if is_line else {}
+        line, sign = look | {"label": part.member}, part.look
         if name in marked:
             line, sign = line | {"color": MARKED, "label": ""}, sign and sign | {"mec": MARKED, "mew": 2.4, "label": ""}
-        if len(part.points) > 1:
+        if is_line:
             view.plot(*part.points[:, axes].T, gid=f"{title}.{name}.line", **line)
         if sign:
             view.plot(*part.place[axes], ls="", gid=f"{title}.{name}", **sign)

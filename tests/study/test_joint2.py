@@ -220,3 +220,22 @@ def test_a_joint_2_that_is_no_table_is_refused_as_a_change() -> None:
     read = load(WHOLE)
     with pytest.raises(InputError, match=r"leaves out .*base.*, which the study sets"):
         changes.with_settings(read, ["shaft.joint2=pin25"])
+
+
+def test_each_joint_has_the_assumptions_of_its_file() -> None:
+    """Values of joint 2's are set in joint 2 alone, at all points; what the study gives of either is not varied."""
+    read = load(WHOLE.replace(RIGID, f"{RIGID}friction.mu = 0.01\n"))
+    named = {each.name: each.values for each in assumptions.assumptions(read)}
+    faces, first = "stiffness of the thrust faces of joint 2", next(name for name in named if "joint 2" not in name)
+    assert named[faces][0] == {"shaft.joint2.thrust.k": "5e7 N/m"}
+    assert "friction of the needles of joint 2" in assumptions.given(read)
+    assert "friction of the needles of joint 2" not in named
+    softer, both = named[faces][0], assumptions.together(read, [named[faces][0], named[first][0]])
+    assert both == {**softer, **named[first][0]}
+    changed = assumptions.with_value(read, softer)
+    assert changed.joint == read.joint
+    for point in changed.points:
+        assert point.operation.joint2.thrust.k == 5e7
+    assert changed.operation.joint2.friction.mu == 0.01
+    assert not assumptions.is_drawn(read, softer)
+    assert assumptions.is_drawn(read, {"shaft.joint2.thrust.k": "1e8 N/m"})

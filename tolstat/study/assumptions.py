@@ -13,11 +13,11 @@ from tolstat.common import units
 from tolstat.common.error_fields import error_units
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.mechanism import Mechanism, features
-from tolstat.joint import derived
+from tolstat.joint import Joint, Operation, derived
 from tolstat.joint.contact import Contact
 from tolstat.joint.derived import get
-from tolstat.joint.model import leaves, merged, nested
-from tolstat.joint.operation import having
+from tolstat.joint.model import Assumed, leaves, merged, nested
+from tolstat.joint.operation import having, shaft_of
 from tolstat.joint.reading import with_keys
 from tolstat.study.measured import left_open, of_entries
 from tolstat.study.selection import excludes
@@ -30,6 +30,10 @@ _OF_CARDAN = "cross", "hub", "shaft"
 """Sections of the joint that linkages do not have."""
 
 
+OF_JOINT2 = "shaft.joint2."
+"""What stands before the keys of joint 2 of a drive shaft, where that is from a file of its own."""
+
+
 class Assumption(NamedTuple):
     """Values of the joint, or of a process, that are assumed, and others that they may have.
 
@@ -38,8 +42,8 @@ class Assumption(NamedTuple):
     name : str
         What is assumed, such as ``contact law``.
     values : tuple of mapping
-        Other values, each dotted keys of the joint with their values as written: ``{"contact.law": "sliced"}``; or
-        keys of `measured.left_open`.
+        Other values, each dotted keys of the joint with their values as written: ``{"contact.law": "sliced"}``, of
+        joint 2 of a drive shaft with `OF_JOINT2` before them; or keys of `measured.left_open`.
     because : str
         Why the value is not known.
     varied : bool
@@ -53,18 +57,20 @@ class Assumption(NamedTuple):
 
 
 def assumptions(study: Study) -> tuple[Assumption, ...]:
-    """Assumptions that hold for the joint of a study: those of its joint file, those of the study, and measured parts.
+    """Assumptions that hold for the joints of a study: those of joint files, those of the study, and measured parts.
 
-    An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
-    Of a linkage those that are about `_OF_CARDAN` alone are left out, too.
+    An assumption of a joint file is left out if it is `given`, and replaced by one of the study of the same name, which
+    is about joint 1 of a drive shaft. Of a linkage those that are about `_OF_CARDAN` alone are left out, too.
     """
+    first, *others = _owners(study)
     out = {*given(study), *(entry.name for entry in study.assumed)}
-    of_joint = [entry for entry in study.joint.assumed if entry.name not in out]
+    of_files = [(owner, entry) for owner in (first, *others) for entry in owner.joint.assumed]
+    of_files = [(owner, entry) for owner, entry in of_files if owner.named(entry) not in out]
     if study.mechanism.placed:
-        of_joint = [entry for entry in of_joint if not set(nested(entry.values[0])) <= set(_OF_CARDAN)]
+        of_files = [both for both in of_files if not set(both[1].values[0]) <= set(_OF_CARDAN)]
     of_values = [
-        Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
-        for entry in (*of_joint, *study.assumed)
+        Assumption(owner.named(entry), tuple(map(owner.written, entry.values)), entry.because, entry.varied)
+        for owner, entry in (*of_files, *((first, entry) for entry in study.assumed))
     ]
     of_parts = [
         Assumption(_process(key), tuple({key: end} for end in ends), f"{entry.parts} parts measured", True)
@@ -81,26 +87,61 @@ def _process(key: str) -> str:
 
 
 def given(study: Study) -> tuple[str, ...]:
-    """Names of the assumptions of the joint file that the study gives: its ``[joint]`` or fit sets one of their keys.
+    """Names of the assumptions of joint files that the study gives: its ``[joint]`` or fit sets one of their keys.
 
     A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
     Beside a spline so is ``shaft.axial``, since a second part that slides would hold nothing.
     """
     replaced = {entry.name for entry in study.assumed}
-    of_study = {
-        *leaves(_keys_of_study(study)),
-        *(("shaft.axial",) if study.mechanism.spline and study.mechanism.is_shaft else ()),
-    }
-    keys = derived.changed(of_study, leaves(study.joint.given("json")))
+    splined = {"shaft.axial"} if study.mechanism.spline and study.mechanism.is_shaft else set()
     return tuple(
-        entry.name
-        for entry in study.joint.assumed
-        if entry.name not in replaced and any(keys.intersection(leaves(value)) for value in entry.values)
+        owner.named(entry)
+        for owner in _owners(study)
+        for keys in [derived.changed({*leaves(owner.keys), *splined}, leaves(owner.joint.given("json")))]
+        for entry in owner.joint.assumed
+        if owner.named(entry) not in replaced and any(keys.intersection(leaves(value)) for value in entry.values)
     )
 
 
+class _Owner(NamedTuple):
+    """A joint from a file of its own: what stands before its keys and behind names; keys that the study sets."""
+
+    before: str
+    behind: str
+    joint: Joint
+    keys: Mapping[str, Any]
+
+    def named(self, entry: Assumed) -> str:
+        """Name of an assumption of its file."""
+        return f"{entry.name}{self.behind}"
+
+    def written(self, value: Mapping[str, Any]) -> dict[str, Any]:
+        """Dotted keys of a value of such an assumption."""
+        return {f"{self.before}{key}": text for key, text in leaves(value).items()}
+
+    def own(self, keys: Mapping[str, Any]) -> dict[str, Any]:
+        """Those of some keys that are of this joint, without `before`."""
+        of_2 = {key.removeprefix(OF_JOINT2): value for key, value in keys.items() if key.startswith(OF_JOINT2)}
+        return of_2 if self.before else {key: value for key, value in keys.items() if not key.startswith(OF_JOINT2)}
+
+
+def _owners(study: Study) -> list[_Owner]:
+    """The joint, and joint 2 of a drive shaft if that is another."""
+    data, joint2 = tomllib.loads(study.text), study.operation.joint2
+    diameters = {} if study.fit is None else {"contact": study.fit.diameters}
+    found = [_Owner("", "", study.joint, merged(_without_base(data["joint"]), diameters))]
+    if joint2 is not None:
+        keys = merged(_without_base(data["shaft"]["joint2"]), diameters)
+        found.append(_Owner(OF_JOINT2, " of joint 2", joint2, keys))
+    return found
+
+
+def _without_base(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key != "base"}
+
+
 def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
-    """Study with some keys of its joint set, as if written in its ``[joint]``; what follows from them is computed anew.
+    """Study with some keys of its joints set, as if written in its ``[joint]``; what follows is computed anew.
 
     Keys of `measured.left_open` change what the entries draw.
 
@@ -126,18 +167,32 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     if study.variants:
         found = "has joints with dimensions of their own: they are no variations of one joint"
         raise input_error(study.path, found, "vary the joint of a study with tolerances")
-    of_joint = nested(_of_joint(study, keys))
-    joint = with_keys(study.joint.given("json"), _keys_of_study(study), of_joint, f"{study.path}: joint")
-    changed = replace(study, joint=joint, tolerances=study.tolerances | of_entries(study, keys))
+    of_joints = _of_joint(study, keys)
+    joint, *others = (
+        with_keys(owner.joint.given("json"), owner.keys, nested(owner.own(of_joints)), f"{study.path}: {place}")
+        for owner, place in zip(_owners(study), ("joint", "shaft.joint2"), strict=False)
+    )
+    points = study.points
+    for joint2 in others:
+        points = tuple(point._replace(operation=_with_joint2(point.operation, joint2)) for point in points)
+    tolerances = study.tolerances | of_entries(study, keys)
+    changed = replace(study, joint=joint, points=points, operation=points[0].operation, tolerances=tolerances)
     changed.check_mounting(idle_forces=True)
     return changed
+
+
+def _with_joint2(operation: Operation, joint2: Joint) -> Operation:
+    shaft = shaft_of(operation)
+    return operation.model_copy(update={"shaft": shaft.model_copy(update={"joint2": joint2})}) if shaft else operation
 
 
 def is_drawn(study: Study, keys: Mapping[str, Any]) -> bool:
     """Whether the joint of a study has these values already: as a variation they would tell nothing."""
     with suppress(InputError):
-        same = with_value(study, keys).joint.model_dump() == study.joint.model_dump()
-        return same and _of_joint(study, keys) == keys
+        joints, others = (
+            [owner.joint.model_dump() for owner in _owners(of)] for of in (study, with_value(study, keys))
+        )
+        return joints == others and _of_joint(study, keys) == keys
     return False
 
 
@@ -154,17 +209,20 @@ def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any
     values : sequence of mapping
         Values of several assumptions; of a key that several change, the last counts.
     """
-    joints = [with_value(study, value).joint for value in values]
-    changing = [
-        {key for key in _of_joint(study, value) if get(joint, key) != get(study.joint, key)}
-        for value, joint in zip(values, joints, strict=True)
-    ]
-    keys_of_joint = leaves(study.joint.given("json"))
     joined: dict[str, Any] = {}
-    for number, value in enumerate(values):
-        others = set().union(*changing[:number], *changing[number + 1 :])
-        following = derived.changed(others, keys_of_joint)
-        joined |= {key: text for key, text in value.items() if key in changing[number] or key not in following}
+    changed = [_owners(with_value(study, value)) for value in values]
+    for at, owner in enumerate(_owners(study)):
+        own = [owner.own(value) for value in values]
+        changing = [
+            {key for key in _of_joint(study, value) if get(owners[at].joint, key) != get(owner.joint, key)}
+            for value, owners in zip(own, changed, strict=True)
+        ]
+        keys_of_joint = leaves(owner.joint.given("json"))
+        for number, value in enumerate(own):
+            others = set().union(*changing[:number], *changing[number + 1 :])
+            following = derived.changed(others, keys_of_joint)
+            kept = {key: text for key, text in value.items() if key in changing[number] or key not in following}
+            joined |= {f"{owner.before}{key}": text for key, text in kept.items()}
     return joined
 
 
@@ -213,13 +271,6 @@ def _along(keys: Sequence[str], axes: str) -> str:
     words = {("offset_e",): f"along {axes}", ("offset_t", "offset_z"): across}
     direction = {"offset": "along", "tilt": "about"}[keys[0].partition("_")[0]]
     return words.get(tuple(keys), f"{direction} {' and '.join(key[-1] for key in keys)}")
-
-
-def _keys_of_study(study: Study) -> dict[str, Any]:
-    """Keys of the joint that a study sets, nested, with the diameters of its fit."""
-    table = tomllib.loads(study.text)["joint"]
-    keys = {key: value for key, value in table.items() if key != "base"}
-    return keys if study.fit is None else merged(keys, {"contact": study.fit.diameters})
 
 
 WIDE = 10.0

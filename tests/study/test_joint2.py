@@ -14,6 +14,7 @@ from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import blank_params
 from tolstat.joint import mechanism_of, nominal_errors, perturb
+from tolstat.questions.assumptions.variations import label_of
 from tolstat.study import assumptions, changes, placing, schema
 from tolstat.study.points import Point
 
@@ -232,6 +233,9 @@ def test_each_joint_has_the_assumptions_of_its_file() -> None:
     assert "friction of the needles of joint 2" not in named
     softer, both = named[faces][0], assumptions.together(read, [named[faces][0], named[first][0]])
     assert both == {**softer, **named[first][0]}
+    labels = [label_of(name, value) for name, values in named.items() for value in values]
+    assert "joint 2: k 5e7 N/m" in labels
+    assert len(labels) == len(set(labels))
     changed = assumptions.with_value(read, softer)
     assert changed.joint == read.joint
     for point in changed.points:

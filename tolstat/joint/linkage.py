@@ -26,7 +26,7 @@ GRAVITY = 9.81
 
 def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
     if not np.linalg.norm(value) > 0.0:
-        raise refuse("{direction} is no direction", "give the components of a vector, such as [0, 0, 1]", "direction")
+        raise refuse("{input} is no direction", "give the components of a vector, such as [0, 0, 1]")
     return value
 
 

@@ -47,11 +47,13 @@ def joint_of(store: Reader, row: int) -> Joint:
 
 
 def description(store: Reader) -> str:
-    """What the file says of the linkage, or of the joint."""
+    """What the file says of the linkage, or of the joint; of a drive shaft of two joints what it says of both."""
     operation = next(iter(store.points.values())).operation
-    return (
-        operation.linkage.description if isinstance(operation, OperationOfLinkage) else joint_of(store, 0).description
-    )
+    if isinstance(operation, OperationOfLinkage):
+        return operation.linkage.description
+    first, joint2 = joint_of(store, 0).description, operation.joint2
+    own = {"joint 1": first, "joint 2": joint2.description} if joint2 else {}
+    return "; ".join(f"{name}: {text}" for name, text in own.items() if text) or first
 
 
 def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:

@@ -19,7 +19,7 @@ from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
-from tolstat.study.assumptions import Assumption, assumptions, given, is_drawn, together, with_value
+from tolstat.study.assumptions import OF_JOINT2, Assumption, assumptions, given, is_drawn, together, with_value
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -304,8 +304,8 @@ def _share(loads: FloatArray, level: float) -> float:
 def label_of(name: str, values: Mapping[str, Any]) -> str:
     """Label of a value of an assumption: ``shaft slides``, ``law sliced``, ``clearance 0.05 mm``, ``fork (l_f 30 mm)``.
 
-    Where the name is long it is the key alone, ``r_b 30 mm``. Of measured parts ``spread of pin*.tilt_t × 1.28``, and
-    ``mean of pin*.tilt_t +0.31 σ``.
+    Where the name is long it is the key alone, ``r_b 30 mm``; of joint 2 ``joint 2: law sliced``. Of measured parts
+    ``spread of pin*.tilt_t × 1.28``, and ``mean of pin*.tilt_t +0.31 σ``.
 
     Parameters
     ----------
@@ -314,6 +314,9 @@ def label_of(name: str, values: Mapping[str, Any]) -> str:
     values : mapping
         Dotted keys of the joint, and their values as written; the first is the one that the assumption is about.
     """
+    if all(key.startswith(OF_JOINT2) for key in values):
+        own = {key.removeprefix(OF_JOINT2): value for key, value in values.items()}
+        return f"joint 2: {label_of(name.removesuffix(' of joint 2'), own)}"
     if AXIAL in values:
         return SHAFT.get(values[AXIAL], (f"shaft held with {_written(values[AXIAL])}", ""))[0]
     if LAW in values:

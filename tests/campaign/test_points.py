@@ -6,6 +6,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.support import fakes
@@ -167,7 +168,7 @@ def test_a_duty_cycle_has_the_cycles_of_each_point_by_its_share_of_the_revolutio
 
 def test_what_needs_one_point_asks_for_it(whole):
     with ResultFile.open(whole) as store:
-        for ask in (store.results, store.status, store.to_pandas, lambda: store.histories("loads")):
+        for ask in (store.results, store.status, lambda: store.histories("loads")):
             with pytest.raises(StoreError, match=r"several operating points: low, mid, high\n.*--point low"):
                 ask()
         with pytest.raises(StoreError, match="--point low"):
@@ -180,6 +181,35 @@ def test_what_needs_one_point_asks_for_it(whole):
         np.testing.assert_array_equal(frame["operation.alpha"], store.errors()["operation.alpha"][1:])
         np.testing.assert_array_equal(frame["alpha"], 0.4 + store.errors()["operation.alpha"][1:])
         assert repr(store).startswith("<result file 'whole.h5': 39 joints (low: ")
+
+
+def test_a_duty_cycle_is_one_table(whole):
+    with ResultFile.open(whole) as store:
+        frame, each = store.to_pandas(), {name: store.at(name).to_pandas() for name in store.points}
+    assert frame.columns[0] == "point"
+    for name, of_point in each.items():
+        found = frame[frame["point"] == name].drop(columns="point")
+        pd.testing.assert_frame_equal(found, of_point)
+    assert frame.attrs["units"]["point"] == "1"
+
+
+def test_a_duty_cycle_is_one_labelled_data_set(whole, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    with ResultFile.open(whole) as store:
+        store.to_xarray().to_netcdf(tmp_path / "whole.nc", engine="h5netcdf")
+        frame, points, errors = store.to_pandas(), store.points, store.errors()
+    with xarray.open_dataset(tmp_path / "whole.nc") as data:
+        assert dict(data.sizes) == {"point": 3, "row": 39}
+        assert data["pin1.tilt_t"].dims == ("row",)
+        np.testing.assert_array_equal(data["pin1.tilt_t"], errors["pin1.tilt_t"][1:])
+        for name, point in points.items():
+            here = data.sel(point=name)
+            np.testing.assert_array_equal(here["cross1.F_max"], frame.loc[frame["point"] == name, "cross1.F_max"])
+            assert float(here["point_speed"]) == point.operation.speed
+        assert data["point_speed"].attrs["units"] == "rad/s"
+        assert data.attrs["seed"] == 7
+        assert {"title", "version", "date", "study"} <= data.attrs.keys()
 
 
 STUDY = """

@@ -230,7 +230,7 @@ def export(
     For Parquet or Excel: tolstat.open(FILE).to_pandas() has the same columns.
 
     If the study has several operating points, --statistics is of the worst of them, --pylife of the duty cycle, and
-    --csv needs --point.
+    --csv has all rows at the first one, then at the next; the column point says at which.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
     versions; causes of a load: tolstat causes FILE --by LOAD --json.

@@ -91,13 +91,16 @@ class ResultFile(Reader):
         Returns
         -------
         pandas.DataFrame
-            Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
+            Index ``row``: row of the campaign. Columns: ``point`` of a file with several operating points, with all
+            rows at the first one first; case, variant, family and group for a study that lists its
             joints; how each joint was drawn, where that is recorded; errors; ``alpha``, ``speed``, ``torque`` and
             ``axial_force`` of each joint: the operating point plus the errors ``operation.alpha`` and so on; kept
             results, ``status`` as text. ``attrs["units"]`` has the SI unit of each column.
         """
-        (frame,) = in_blocks(self, nominal, max(self.n, 1))
-        return frame
+        frames = list(in_blocks(self, nominal, max(self.n, 1)))
+        whole = pd.concat(frames)
+        whole.attrs = frames[0].attrs
+        return whole
 
     def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
         """Export errors and results along ``row``, with units and descriptions.
@@ -106,6 +109,13 @@ class ResultFile(Reader):
         ----------
         nominal : bool
             As in `to_pandas`.
+
+        Returns
+        -------
+        xarray.Dataset
+            The columns of `to_pandas`; of several operating points what depends on them has the dimension ``point``
+            before ``row``. Coordinates along it: ``share`` of the time, and the values of the point, ``point_alpha``,
+            ``point_speed``, ``point_torque``, ``point_axial_force``, SI. Attributes: title, version, date, seed, study.
 
         Raises
         ------
@@ -117,10 +127,33 @@ class ResultFile(Reader):
         except ImportError as error:
             remedy = "install it with: pip install xarray, or use to_pandas()"
             raise input_error(self.path, "xarray is not installed", remedy) from error
-        frame, columns = self.to_pandas(nominal), described(self)
-        attrs = {name: {"units": c.unit, "description": c.description} for name, c in columns.items()}
-        data = {name: ("row", frame[name].to_numpy(), attrs.get(str(name), {})) for name in frame}
-        return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": self.study_name})
+        frames, columns = list(in_blocks(self, nominal, max(self.n, 1))), described(self)
+        units = {name: {"units": c.unit, "description": c.description} for name, c in columns.items()}
+        first, coords = frames[0], {"row": ("row", frames[0].index.to_numpy(), {})} | self._coordinates
+        of_points = {c.name for c in (*OPERATING, *self.each()[0].columns)} | {"attempt"}
+        data: dict[str, tuple[Any, ...]] = {}
+        for name in map(str, first.drop(columns="point", errors="ignore")):
+            at_each = [frame[name].to_numpy() for frame in frames]
+            of_point = "point" in first and name in of_points
+            values = (("point", "row"), np.stack(at_each)) if of_point else ("row", at_each[0])
+            data[name] = (*values, units.get(name, {}))
+        attrs = {"title": self.study_name, "version": self.versions["tolstat"], "date": self.created}
+        attrs |= {"seed": self.sampling["seed"], "study": self.study_text}
+        return xarray.Dataset(data, coords, {name: value for name, value in attrs.items() if value is not None})
+
+    @property
+    def _coordinates(self) -> dict[str, tuple[Any, ...]]:
+        """Coordinates along the operating points of a file with several, for `to_xarray`."""
+        points = [store.points[store.point] for store in self.each() if store.point]
+        if not points:
+            return {}
+        values = {
+            f"point_{c.name}": ([float(getattr(point.operation, c.name)) for point in points], {"units": c.unit})
+            for c in OPERATING
+        }
+        of_time = [point.share for point in points], {"units": "1", "description": "share of the time"}
+        names = [point.name for point in points], {"description": "operating point"}
+        return {key: ("point", *both) for key, both in ({"point": names, "share": of_time} | values).items()}
 
 
 class NamedLoads(Mapping[str, "pd.Series[float]"]):
@@ -175,21 +208,22 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `ResultFile.to_pandas` for the others."""
-    of_errors = error_columns(store.mechanism)
-    return {c.name: c for c in (*drawn_columns(store.sampling), *of_errors, *OPERATING, *store.columns)}
+    of_errors, results = error_columns(store.mechanism), store.each()[0].columns
+    return {c.name: c for c in (*drawn_columns(store.sampling), *of_errors, *OPERATING, *results)}
 
 
 def in_blocks(store: Reader, nominal: bool, at_once: int = AT_ONCE) -> Iterator[pd.DataFrame]:
-    """Yield the rows of `ResultFile.to_pandas` in blocks of at most `at_once`, one at least."""
+    """Yield the rows of `ResultFile.to_pandas` in blocks of at most `at_once`, of each operating point one at least."""
     first, listed = 0 if nominal else store.first_sample, _listed(store)
-    for begin in range(first, max(store.n, first + 1), at_once):
-        yield _frame(store, slice(begin, min(begin + at_once, store.n)), nominal, listed)
+    for part in store.each():
+        for begin in range(first, max(store.n, first + 1), at_once):
+            yield _frame(part, slice(begin, min(begin + at_once, store.n)), nominal, listed)
 
 
 def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
     """Rows of a campaign; `listed` as from `_listed`."""
     errors, results = store.errors(rows), store.results(rows)
-    data: dict[str, NDArray[Any]] = {}
+    data: dict[str, NDArray[Any]] = {"point": np.full(len(results), store.point, object)} if store.point else {}
     if nominal:
         data["nominal"] = np.arange(rows.start, rows.stop) < store.first_sample
     data |= {name: values[rows] for name, values in listed.items()}

@@ -144,8 +144,8 @@ class ResultFile(Reader):
     @property
     def _coordinates(self) -> dict[str, tuple[Any, ...]]:
         """Coordinates along the operating points of a file with several, for `to_xarray`."""
-        points = [store.points[store.point] for store in self.each() if store.point]
-        if not points:
+        points = [store.points[store.point or ""] for store in self.each()]
+        if len(points) == 1:
             return {}
         values = {
             f"point_{c.name}": ([float(getattr(point.operation, c.name)) for point in points], {"units": c.unit})
@@ -215,15 +215,20 @@ def described(store: Reader) -> dict[str, Column]:
 def in_blocks(store: Reader, nominal: bool, at_once: int = AT_ONCE) -> Iterator[pd.DataFrame]:
     """Yield the rows of `ResultFile.to_pandas` in blocks of at most `at_once`, of each operating point one at least."""
     first, listed = 0 if nominal else store.first_sample, _listed(store)
-    for part in store.each():
+    parts = store.each()
+    for part in parts:
         for begin in range(first, max(store.n, first + 1), at_once):
-            yield _frame(part, slice(begin, min(begin + at_once, store.n)), nominal, listed)
+            frame = _frame(part, slice(begin, min(begin + at_once, store.n)), nominal, listed)
+            if len(parts) > 1:
+                frame.insert(0, "point", part.point)
+                frame.attrs["units"] = {"point": "1"} | frame.attrs["units"]
+            yield frame
 
 
 def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
     """Rows of a campaign; `listed` as from `_listed`."""
     errors, results = store.errors(rows), store.results(rows)
-    data: dict[str, NDArray[Any]] = {"point": np.full(len(results), store.point, object)} if store.point else {}
+    data: dict[str, NDArray[Any]] = {}
     if nominal:
         data["nominal"] = np.arange(rows.start, rows.stop) < store.first_sample
     data |= {name: values[rows] for name, values in listed.items()}

@@ -1,4 +1,4 @@
-"""tolstat: Monte Carlo tolerance analysis of over-constrained mechanisms, the Cardan joint first.
+"""tolstat: Monte Carlo tolerance analysis of Cardan joints.
 
     study = tolstat.load("studies/iso2768_f.toml")
     tolstat.run(study, "iso2768_f.h5")

@@ -271,7 +271,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         if report:
             with progress("report"):
                 answer = library.reports.report(store.view())
-            deliver(answer, wide, stem=path.with_suffix(""), which="picture")
+            deliver(answer, wide, stem=path.with_suffix(""))
         without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
         for text in library.remedy.in_words(without_load):
             say(text)

@@ -1,4 +1,4 @@
-"""tolstat: Monte Carlo tolerance analysis of Cardan joints.
+"""tolstat: Monte Carlo tolerance analysis of over-constrained mechanisms, the Cardan joint first.
 
     study = tolstat.load("studies/iso2768_f.toml")
     tolstat.run(study, "iso2768_f.h5")

@@ -144,6 +144,17 @@ def test_a_value_that_a_pair_leaves_is_told(tmp_path: Path) -> None:
     assert "is inherited from [joint]" in fault.found
 
 
+def test_the_radius_of_friction_of_another_pin_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(TEXT.replace("eye_t = [4, 3, 0]", 'joint.pin = { d = "40 mm", l = "30 mm" }'), encoding="utf-8")
+    (fault,) = study.load(path).others["mechanism.pair.D.joint"].warnings()
+    assert fault.place == "friction.radius"
+    assert "half of contact.D_P is 0.02 m" in fault.found
+    own = 'joint = { pin = { d = "40 mm", l = "30 mm" }, friction = { radius = "20 mm" } }'
+    path.write_text(TEXT.replace("eye_t = [4, 3, 0]", own), encoding="utf-8")
+    assert not study.load(path).others["mechanism.pair.D.joint"].warnings()
+
+
 def test_ideal_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(f'{TEXT}\n[solver]\nfidelity = "ideal"\n', encoding="utf-8")

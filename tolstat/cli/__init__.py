@@ -150,7 +150,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load.
+    """Monte Carlo tolerance analysis of over-constrained mechanisms: which share exceeds a load.
 
     \b
     For the first time:

@@ -247,6 +247,13 @@ def _inherited(
         inherited, value = _written(in_file[key], key, in_file[key]), _written(expected, key, in_file[key])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
+    radius = None if joint.friction.mu is None else in_file.get("friction.radius")
+    if changed & {"pin.d", "contact.D_P"} and "friction.radius" not in given and radius is not None:
+        half = 0.5 * joint.contact.D_P
+        if not math.isclose(units.to_si(radius, "m"), half, rel_tol=1e-6):
+            expected = units.written(half, "m", radius, digits=3)
+            found = f"{radius} is inherited from {path.stem}; half of contact.D_P is {expected}"
+            yield Fault("friction.radius", found, "give friction.radius, this value or that")
     along = in_file.get("friction.mu_along")
     if "friction.mu" in given and "friction.mu_along" not in given and along not in (None, joint.friction.mu):
         found = f"{along} along the pins is inherited from {path.stem}, beside mu = {joint.friction.mu:g} around them"

@@ -28,7 +28,7 @@ from tolstat.store.metadata import Metadata
 FILETYPE = "tolstat campaign"
 COLUMN_OVERHEAD = 800
 """Bytes that HDF5 needs per column beside its values."""
-ABOUT = "Monte Carlo campaign of Cardan joints: row i is joint i in every dataset, SI units throughout"
+ABOUT = "Monte Carlo campaign: row i is joint i in every dataset, SI units throughout"
 """Description of the whole file."""
 GROUPS = {
     "design": "which of the listed joints each row is",

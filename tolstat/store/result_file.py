@@ -114,8 +114,9 @@ class ResultFile(Reader):
         -------
         xarray.Dataset
             The columns of `to_pandas`; of several operating points what depends on them has the dimension ``point``
-            before ``row``. Coordinates along it: ``share`` of the time, and the values of the point, ``point_alpha``,
-            ``point_speed``, ``point_torque``, ``point_axial_force``, SI. Attributes: title, version, date, seed, study.
+            before ``row``. Coordinates along it, SI: ``share`` of the time, and the values that the point has,
+            ``point_alpha`` (of a drive shaft that of joint 1), ``point_speed``, ``point_torque``,
+            ``point_axial_force``. Attributes: title, version, date, seed, study.
 
         Raises
         ------
@@ -150,6 +151,7 @@ class ResultFile(Reader):
         values = {
             f"point_{c.name}": ([float(getattr(point.operation, c.name)) for point in points], {"units": c.unit})
             for c in OPERATING
+            if c.name in recorded.operating_points(self.each()[0], slice(0, 1))
         }
         of_time = [point.share for point in points], {"units": "1", "description": "share of the time"}
         names = [point.name for point in points], {"description": "operating point"}

@@ -67,7 +67,7 @@ def assumptions(study: Study) -> tuple[Assumption, ...]:
     of_files = [(owner, entry) for owner in (first, *others) for entry in owner.joint.assumed]
     of_files = [(owner, entry) for owner, entry in of_files if owner.named(entry) not in out]
     if study.mechanism.placed:
-        of_files = [both for both in of_files if not set(both[1].values[0]) <= set(_OF_CARDAN)]
+        of_files = [both for both in of_files if not set(nested(both[1].values[0])) <= set(_OF_CARDAN)]
     of_values = [
         Assumption(owner.named(entry), tuple(map(owner.written, entry.values)), entry.because, entry.varied)
         for owner, entry in (*of_files, *((first, entry) for entry in study.assumed))

@@ -48,7 +48,7 @@ def _check_own(file: Reading, key: str, pair: PairOf, joint: Joint) -> None:
             found, remedy = "has no effect: the study's joint has none", f"give [joint.{section}], for all pairs, too"
             file.fault(f"{key}.joint.{section}", found, remedy)
     if pair.clearance is not None and "contact.clearance" in given:
-        file.fault(f"{key}.clearance", "is given as joint.contact.clearance, too", "remove one of the two")
+        file.fault(f"{key}.clearance", "is given as joint.contact.clearance, too", "give the latter alone")
     for diameter in BEARING:
         if file.fit is not None and diameter in given:
             file.fault(f"{key}.joint.{diameter}", *fits.BESIDE)

@@ -148,10 +148,11 @@ class ResultFile(Reader):
         points = [store.points[store.point or ""] for store in self.each()]
         if len(points) == 1:
             return {}
+        known = recorded.operating_points(self.each()[0], slice(0, 1))
         values = {
             f"point_{c.name}": ([float(getattr(point.operation, c.name)) for point in points], {"units": c.unit})
             for c in OPERATING
-            if c.name in recorded.operating_points(self.each()[0], slice(0, 1))
+            if c.name in known
         }
         of_time = [point.share for point in points], {"units": "1", "description": "share of the time"}
         names = [point.name for point in points], {"description": "operating point"}

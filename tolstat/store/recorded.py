@@ -47,13 +47,15 @@ def joint_of(store: Reader, row: int) -> Joint:
 
 
 def description(store: Reader) -> str:
-    """What the file says of the linkage, or of the joint; of a drive shaft of two joints what it says of both."""
+    """What the file says of the linkage, or of the joint; of a drive shaft of unlike joints what it says of both."""
     operation = next(iter(store.points.values())).operation
     if isinstance(operation, OperationOfLinkage):
         return operation.linkage.description
     first, joint2 = joint_of(store, 0).description, operation.joint2
-    own = {"joint 1": first, "joint 2": joint2.description} if joint2 else {}
-    return "; ".join(f"{name}: {text}" for name, text in own.items() if text) or first
+    if joint2 is None or joint2.description == first:
+        return first
+    own = {"joint 1": first, "joint 2": joint2.description}
+    return "; ".join(f"{name}: {text}" for name, text in own.items() if text)
 
 
 def joints_at(store: Reader, row: int) -> tuple[Joint, ...]:

@@ -1,5 +1,6 @@
 """The same joints at several operating points in one campaign."""
 
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -210,6 +211,19 @@ def test_a_duty_cycle_is_one_labelled_data_set(whole, tmp_path):
         assert data["point_speed"].attrs["units"] == "rad/s"
         assert data.attrs["seed"] == 7
         assert {"title", "version", "date", "study"} <= data.attrs.keys()
+
+
+def test_groups_of_points_say_their_values(whole):
+    with ResultFile.open(whole) as store:
+        points, text = store.points, store.study_text
+    with h5py.File(whole) as file:
+        assert file.attrs["seed"] == 7
+        assert file.attrs["study"].decode() == text
+        for name, point in points.items():
+            own = file[f"points/{name}"].attrs
+            assert (own["alpha"], own["alpha_units"].decode()) == (point.operation.alpha, "rad")
+            assert own["torque"] == point.operation.torque
+            assert ("share" in own) == (not math.isnan(point.share))
 
 
 STUDY = """

@@ -22,7 +22,7 @@ from tolstat.common import tables
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Simulation, Status
-from tolstat.store import ResultFile, Writer, metadata
+from tolstat.store import ResultFile, Writer, layout, metadata
 from tolstat.store.hdf5 import text
 from tolstat.store.metadata import Metadata
 from tolstat.store.result_file import OPERATING
@@ -41,6 +41,13 @@ def new_store(path: Path, study: fakes.Study) -> Writer:
 @pytest.fixture
 def study() -> fakes.Study:
     return fakes.Study(n=12, output=fakes.Output("full"))
+
+
+@pytest.mark.parametrize("n", [500, 4000])
+def test_the_size_of_a_file_is_known_before_it_is_made(tmp_path: Path, n: int) -> None:
+    with new_store(tmp_path / "a.h5", fakes.Study(n=n)) as store:
+        expected = layout.size_of(store.metadata)
+    assert (tmp_path / "a.h5").stat().st_size == pytest.approx(expected, rel=0.05)
 
 
 def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:

@@ -277,7 +277,7 @@ def plan(
         workers=workers,
         stages=stages,
         process_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024),
-        file_bytes=layout.size_of(document) + len(document.model_dump_json()),
+        file_bytes=layout.size_of(document, 2 * few(study.rows)),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},

@@ -27,7 +27,7 @@ from tolstat.store.metadata import Metadata
 
 FILETYPE = "tolstat campaign"
 COLUMN_OVERHEAD = 800
-"""Bytes that HDF5 needs per column beside its values."""
+"""Approximate number of bytes that HDF5 needs per column beside its values."""
 ABOUT = "Monte Carlo campaign: row i is joint i in every dataset, SI units throughout"
 """Description of the whole file."""
 GROUPS = {
@@ -50,6 +50,8 @@ SESSION = {
     "done": ("i8", "1", "joints that were done when it started"),
 }
 """Type, unit and description of each dataset of the group ``session``."""
+OF_POINT = {"share": "1", "alpha": "rad", "speed": "rad/s", "torque": "N*m", "axial_force": "N"}
+"""Unit of each value of an operating point that is an attribute of its group."""
 LINKED = ("row", "nominal")
 """Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 
@@ -126,10 +128,26 @@ def check_names(file: h5py.File, metadata: Metadata) -> None:
             raise ValueError(f"{min(unknown)!r} is not the name of a group or dataset of this schema")
 
 
-def size_of(metadata: Metadata) -> int:
-    """Approximate upper bound on the size of a new file, bytes, without its metadata."""
+def describe(file: h5py.File, metadata: Metadata) -> None:
+    """Write the metadata, and as attributes what is asked for without them, of the campaign and of each point."""
+    documents.write(file, metadata)
+    put_attributes(file, metadata.about)
+    for point, values in metadata.points.items():
+        holder = file.require_group(place_of(point) or "/")
+        for name, unit in OF_POINT.items():
+            if values.get(name) is not None:
+                put_attributes(holder, {name: values[name], f"{name}_units": unit})
+            else:
+                holder.attrs.pop(name, None)
+                holder.attrs.pop(f"{name}_units", None)
+
+
+def size_of(metadata: Metadata, checked: int = 0) -> int:
+    """Approximate size of a file, bytes, with `checked` joints at each point that are simulated again."""
     stored = datasets(metadata)
-    return sum(dataset.shape[0] * dataset.row_bytes for dataset in stored) + COLUMN_OVERHEAD * len(stored)
+    values = sum(dataset.shape[0] * dataset.row_bytes for dataset in stored)
+    values += 8 * checked * sum(is_at_point(dataset.path) for dataset in stored)
+    return values + COLUMN_OVERHEAD * len(stored) + len(metadata.model_dump_json())
 
 
 def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
@@ -147,7 +165,7 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     n, first, codes, groups = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
     about: dict[str, str | int | float] = {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION}
     put_attributes(file, about | {"mechanism": metadata.mechanism, "description": ABOUT})
-    documents.write(file, metadata)
+    describe(file, metadata)
     row = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
     for begin in range(0, n, BLOCK):
         row[begin : begin + BLOCK] = np.arange(first + begin, first + min(begin + BLOCK, n))

@@ -96,6 +96,13 @@ class Metadata(BaseModel):
     git_commit: str
 
     @property
+    def about(self) -> dict[str, Any]:
+        """Title, version, date, seed and study, as results carry them into other programs."""
+        known = {"title": self.study_name, "version": self.versions["tolstat"], "date": self.created}
+        known |= {"seed": self.sampling["seed"], "study": self.study}
+        return {name: value for name, value in known.items() if value is not None}
+
+    @property
     def simulated(self) -> Mechanism:
         """The mechanism by its name, one of `cardan.MECHANISMS`, or a linkage of its operating points.
 

@@ -138,9 +138,7 @@ class ResultFile(Reader):
             of_point = "point" in first and name in of_points
             values = (("point", "row"), np.stack(at_each)) if of_point else ("row", at_each[0])
             data[name] = (*values, units.get(name, {}))
-        attrs = {"title": self.study_name, "version": self.versions["tolstat"], "date": self.created}
-        attrs |= {"seed": self.sampling["seed"], "study": self.study_text}
-        return xarray.Dataset(data, coords, {name: value for name, value in attrs.items() if value is not None})
+        return xarray.Dataset(data, coords, self.metadata.about)
 
     @property
     def _coordinates(self) -> dict[str, tuple[Any, ...]]:

@@ -340,7 +340,10 @@ def write_new(
     try:
         make_parent(path)
         check_disk_space(path, layout.size_of(document))
-        with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w", meta_block_size=STRUCTURES) as file:
+        with (
+            atomic_write(path, overwrite=overwrite) as temporary,
+            h5py.File(temporary, "w", meta_block_size=STRUCTURES) as file,
+        ):
             layout.create(file, document, tables)
             checksums.create(file, document)
             if fill is not None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tolstat.common.columns import SUBSET
 from tolstat.common.late import special
 from tolstat.joint import MEANS, Operation, nominal_errors
-from tolstat.study import Study, axes
+from tolstat.study import Given, Study, axes, load
 from tolstat.study.design import KEYS, Design
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.zone_laws import plane_scores
@@ -28,13 +28,13 @@ BLOCK = 1 << 16
 """Number of rows drawn at a time: a table of 27 MB."""
 
 
-def draw(study: Study, rows: range | None = None) -> Table:
+def draw(study: Given, rows: range | None = None) -> Table:
     """Draw the errors of the joints of a study.
 
     Parameters
     ----------
-    study : Study
-        Study whose errors are drawn.
+    study : Study, str, Path or mapping
+        Study whose errors are drawn, see `study.load`.
     rows : range, optional
         Rows to draw, with step 1; all rows of the study by default.
 
@@ -44,6 +44,7 @@ def draw(study: Study, rows: range | None = None) -> Table:
         Row 0 is the nominal joint if the study has one: no error of any kind, not even the study's fixed ones. The
         other rows are samples 0, 1, 2, ...
     """
+    study = load(study)
     rows = range(study.rows) if rows is None else rows
     table = nominal_errors(len(rows), study.mechanism)
     numbers = study.sampling.samples(rows)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -26,7 +25,7 @@ from tolstat.common.tables import Options, tables
 from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import parameters_of, settings
-from tolstat.study import Study, axes, load
+from tolstat.study import Given, Study, axes, load
 from tolstat.study.selection import select, suggestion
 
 if TYPE_CHECKING:
@@ -291,14 +290,14 @@ class Function:
 
 
 def function(
-    study: Study | str | Path, loads: str | Sequence[str] | None = None, *, point: str = "", workers: int | None = None
+    study: Given, loads: str | Sequence[str] | None = None, *, point: str = "", workers: int | None = None
 ) -> Function:
     """Loads of the joints of a study as a function of their errors, for other tools.
 
     Parameters
     ----------
-    study : Study, str or Path
-        Study, or its TOML file, with tolerances, a sweep or listed joints; how it samples is left to the other tool.
+    study : Study, str, Path or mapping
+        Study, see `study.load`, with tolerances, a sweep or listed joints; how it samples is left to the other tool.
     loads : str or sequence of str, optional
         Name of a load or pattern such as ``cross*.F``, or several; by default those with limits, without limits those
         of reports.
@@ -319,12 +318,8 @@ def function(
     faults: list[Fault] = []
     with gather(faults):
         number_of_workers(workers)
-    if not isinstance(study, Study | str | Path):
-        found = f"{type(study).__name__} is no study"
-        faults.append(Fault("study", found, "give what tolstat.load makes, or the path of the TOML file"))
-    else:
-        with gather(faults):
-            study = study if isinstance(study, Study) else load(study)
+    with gather(faults):
+        study = load(study)
     if not isinstance(study, Study):
         raise InputError(faults)
     loads = [loads] if isinstance(loads, str) else loads

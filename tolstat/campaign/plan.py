@@ -35,7 +35,7 @@ from tolstat.solver.histories import history_specs
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import Study, assumptions, design
+from tolstat.study import Given, Study, assumptions, design, load
 from tolstat.study.points import names_of
 from tolstat.study.tolerances.correlation import correlations
 from tolstat.study.tolerances.entry import meanings
@@ -213,14 +213,14 @@ class Plan:
 
 
 def plan(
-    study: Study, workers: int | None = None, pilot: int = PILOT, stage: Tell = silent, accepted: float = math.nan
+    study: Given, workers: int | None = None, pilot: int = PILOT, stage: Tell = silent, accepted: float = math.nan
 ) -> Plan:
     """Simulate a pilot of joints, spread over the study's rows, and predict cost and precision of the campaign.
 
     Parameters
     ----------
-    study : Study
-        The study.
+    study : Study, str, Path or mapping
+        The study, see `study.load`.
     workers : int, optional
         Number of processes of the campaign; without it the number of cores.
     pilot : int
@@ -238,8 +238,9 @@ def plan(
     Raises
     ------
     InputError
-        When a share is accepted of joints that are not independent.
+        When a share is accepted of joints that are not independent, or with the faults of the study.
     """
+    study = load(study)
     iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     if not (iid or math.isnan(accepted)):
         raise input_error("--accept", "numbers of joints are known for independent joints only", "leave it out")

@@ -24,7 +24,7 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
-from tolstat.study import Study
+from tolstat.study import Given, load_case
 
 KEPT = {"histories": "histories", "n_harmonics": "harmonics"}
 """Key of ``[output]`` that each parameter of the simulation has its value from."""
@@ -135,18 +135,19 @@ def _components(history: LoadHistory, histories: Mapping[str, NDArray[Any]]) -> 
     }
 
 
-def simulate_case(case: Study) -> CaseResult:
+def simulate_case(case: Given) -> CaseResult:
     """Simulate the joint of a case file, and the same joint without errors.
 
     Parameters
     ----------
-    case : Study
-        As `study.load_case` reads it.
+    case : Study, str, Path or mapping
+        One joint with its errors, see `study.load_case`.
 
     Returns
     -------
     CaseResult
     """
+    case = load_case(case)
     errors = nominal_errors(2, case.mechanism)
     for name, value in case.errors.items():
         errors[name][0] = value

@@ -32,7 +32,7 @@ from tolstat.store import Reader, Writer, metadata
 from tolstat.store.hdf5 import store_error
 from tolstat.store.metadata import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
-from tolstat.study import Study
+from tolstat.study import Given, Study, load
 
 
 class Stop:
@@ -92,8 +92,8 @@ def signals_caught() -> Iterator[Stop]:
             signal.signal(caught, signal.SIG_DFL if handler is None else handler)
 
 
-class Interrupted(Exception):
-    """A campaign was stopped by a signal; the file holds all finished blocks.
+class Interrupted(KeyboardInterrupt):
+    """A campaign was stopped, by Ctrl-C or another signal; the file holds all finished blocks.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Interrupted(Exception):
 
 
 def run(
-    study: Study,
+    study: Given,
     out: str | Path,
     workers: int | None = None,
     block: int | None = None,
@@ -134,8 +134,8 @@ def run(
 
     Parameters
     ----------
-    study : Study
-        The study.
+    study : Study, str, Path or mapping
+        The study, see `study.load`.
     out : str or Path
         Result file; created if it does not exist. Otherwise its pending rows are simulated, and its limits, study
         text and study name are updated from `study`.
@@ -179,6 +179,7 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
+    study = load(study)
     if progress is True:
         with display(tell) as shown:
             others = rows, until_row, executor, scheduler, retry, tell, check

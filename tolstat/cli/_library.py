@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tolstat.questions.exceedance import answer as exceedance
     from tolstat.questions.fatigue import loads as fatigue
     from tolstat.report import answer as reports
+    from tolstat.report import evaluate as evaluating
     from tolstat.report import page, parts
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
     from tolstat.study import assumptions, crosses, mounting, points, rewriting, starter
@@ -45,8 +46,8 @@ else:
     answers, rewording, style, table, text = (Late(f"tolstat.display.{name}") for name in names)
     names = ("accuracy", "joints", "drawings.answer", "drawings.dimensions", "exceedance.answer", "fatigue.loads")
     accuracy, joints, drawings, dimensions, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
-    names = ("report.answer", "report.page", "report.parts", "joint.sections")
-    reports, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
+    names = ("report.answer", "report.evaluate", "report.page", "report.parts", "joint.sections")
+    reports, evaluating, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
     names = ("assumptions", "crosses", "mounting", "points", "rewriting", "schema", "spectrum", "starter")

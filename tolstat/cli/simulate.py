@@ -10,12 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from tolstat.cli import _library as library
-from tolstat.cli._library import np
 from tolstat.cli._shared import (
     about,
     answered,
     deliver,
     echo,
+    loaded,
     opened,
     print_json,
     print_warnings,
@@ -30,7 +30,6 @@ from tolstat.cli._shared import (
 )
 from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
-from tolstat.common.wording import Wording
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
 FORMATS = (".svg", ".png", ".pdf")
@@ -192,45 +191,23 @@ def evaluate(
     """
     if out != "-":
         check_target(Path(out), errors)
-    whole = library.studies.load(study)
-    chosen = library.function.function(whole, loads, point=point)
-    shown_loads = library.parts.names_of(chosen.study.limits, whole.mechanism)
-    f = library.function.function(whole, [*chosen.loads, *shown_loads], point=point, workers=workers)
-    names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
-    needed = [name for name in names if uniform or name == library.function.VARIANT]
-    varied = [name for name in names if name not in needed]
-    joints = library.crosses.read(errors, whole.mechanism, units, None if uniform else whole.errors, needed)
-    about(Wording.of(whole.mechanism, whole.text, joints.labels))
-    for note in joints.notes:
-        say(note)
-    own = dict.fromkeys(library.tables.FACTORS, 1.0) | whole.errors
-    nominal = {name: np.full(len(joints.labels), own.get(name, 0.0)) for name in varied}
+    given = loaded(study)
     with work(workers=workers) as shown:
-        shown.display.stage("simulation")
-        y = f(f.uniform(joints.columns) if uniform else nominal | joints.columns)
-    unit_of = library.load_units.units_of_loads(f.study.mechanism)
-    has_life = np.isin(f.status, library.tables.VALID)
-    lives = {
-        name: np.where(has_life, h, np.nan).tolist() for name, h in library.parts.lives(f.study, f.turning).items()
-    }
-    head = [["status", *chosen.loads, *lives], ["", *(unit_of[name] for name in chosen.loads), *("h" for _ in lives)]]
-    columns = [[library.tables.Status(number).label for number in f.status], *y[:, : len(chosen.loads)].T.tolist()]
-    columns += lives.values()
-    if joints.named:
-        head, columns = [["joint", *head[0]], ["", *head[1]]], [joints.labels, *columns]
-    rows = library.text.csv_rows(columns)
-    write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
-    invalid = f.status[~np.isin(f.status, library.tables.VALID)]
-    say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {invalid.size} of them without a valid load")
-    for state in map(library.tables.Status, np.unique(invalid)):
+        found = library.evaluating.evaluate(
+            given, errors, loads, uniform=uniform, point=point, workers=workers, tell=say, stage=shown.display.stage
+        )
+    head, rows = [[*found.frame], [*found.frame.attrs["units"].values()]], found.frame.to_dict("list").values()
+    write(out, lambda to: csv.writer(to, lineterminator="\n").writerows([*head, *library.text.csv_rows([*rows])]))
+    status = found.frame["status"]
+    invalid = status[~status.isin([state.label for state in library.tables.VALID])]
+    say(f"{'' if out == '-' else f'wrote {out}: '}{len(status)} joints, {len(invalid)} of them without a valid load")
+    for state in (state for state in library.tables.Status if state.label in invalid.unique()):
         hint = library.remedy.WITHOUT_RESULTS.get(state)
-        say(f"{int((invalid == state).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")
+        say(f"{int((invalid == state.label).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")
         if hint:
             say(f"  hint: {hint}")
     if out != "-":
-        values = dict(zip(f.loads, y.T, strict=True))
-        found = library.parts.parts(f.study, values, f.turning, joints.labels, f.status)
-        deliver(answered(library.answers.Answer("evaluate", "Joints", found)), wide=False)
+        deliver(found.answer, wide=False)
 
 
 def show(

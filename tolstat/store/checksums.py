@@ -19,7 +19,7 @@ from h5py import h5d
 from numpy.typing import NDArray
 
 from tolstat.store import layout
-from tolstat.store.hdf5 import put_attributes, put_scale, read_rows, told_as_damage
+from tolstat.store.hdf5 import put_attributes, put_scale, read_rows, store_error, told_as_damage
 from tolstat.store.layout import Stored
 from tolstat.store.metadata import Metadata
 
@@ -63,12 +63,29 @@ class CheckedFile:
 
     def use(self, file: h5py.File, metadata: Metadata) -> None:
         """Use another file in the place of the one before."""
-        self.file = file
+        self._file = file
         self.stored = {stored.path: stored for stored in layout.datasets(metadata)}
         self._index = {path: k for k, path in enumerate(self.stored)}
         self._datasets: dict[str, h5d.DatasetID] = {}
         self._known: dict[tuple[str, ...], NDArray[np.uint8]] = {}
         self._number = -1
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the file has not been closed."""
+        return bool(self._file)
+
+    @property
+    def file(self) -> h5py.File:
+        """The file; a `StoreError` if it has been closed."""
+        if not self.is_open:
+            raise store_error(self.path, "is closed", "ask inside its with block, or open it again")
+        return self._file
+
+    def close(self) -> None:
+        """Close the file."""
+        self._datasets.clear()
+        self._file.close()
 
     def read(self, path: str, begin: int, end: int) -> NDArray[Any]:
         """Read rows of a dataset with a row for each joint, (end - begin, ...)."""

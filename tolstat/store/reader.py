@@ -142,7 +142,7 @@ class Reader:
     @property
     def is_open(self) -> bool:
         """Whether the file has not been closed."""
-        return bool(self._checked.file)
+        return self._checked.is_open
 
     def __enter__(self) -> Self:
         return self
@@ -154,7 +154,7 @@ class Reader:
         """Close the file; joints that were left out because their results are damaged are told as a warning."""
         if self.is_open:
             self._tell("are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
-        self._checked.file.close()
+        self._checked.close()
 
     def _tell(self, done: str, remedy: str) -> None:
         """Warn of the blocks that were found damaged so far, once."""

@@ -107,7 +107,7 @@ class Writer(Reader):
         try:
             store._verify()
         except BaseException:
-            store._checked.file.close()
+            store._checked.close()
             raise
         return store
 
@@ -138,7 +138,7 @@ class Writer(Reader):
         """Write the checksums if anything was written, and close the file."""
         if self.is_open:
             self.finish()
-        self._checked.file.close()
+        self._checked.close()
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         """Write the results of `rows` at the operating point; on return they are on disk and no longer pending.

@@ -394,7 +394,7 @@ def of_text(text: str, place: str) -> Fatigue:
         With every fault.
     """
     read_section(Path(place), text, "fatigue")
-    file = Reading(Path(place), read_toml(Path(place), text), text)
+    file = Reading(Path(place), text, read_toml(Path(place), text))
     settings = read(file)
     file.finish()
     return settings

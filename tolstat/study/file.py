@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from tolstat.common.columns import holds
@@ -26,7 +25,7 @@ from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.points import Point
 from tolstat.study.selection import Assignments, Entry, Reading, toleranced_units
-from tolstat.study.study import Study
+from tolstat.study.study import Given, Study, is_read
 from tolstat.study.tolerances import correlation, fits, kinds
 from tolstat.study.tolerances.kinds import Tolerances
 
@@ -265,7 +264,7 @@ def _check_histories(file: Reading, output: Output, solver: Solver) -> None:
 
 
 def load(
-    path: str | Path | Mapping[str, Any],
+    path: Given,
     n: int | None = None,
     text: str | None = None,
     joint: Joint | None = None,
@@ -275,9 +274,9 @@ def load(
 
     Parameters
     ----------
-    path : str, Path or mapping
+    path : str, Path, mapping or Study
         TOML file; or the sections of one as nested dictionaries, ``{"joint": {"base": "cirelli2021"}, ...}``, whose
-        paths start from the working directory.
+        paths start from the working directory. A study is returned as it is, with `n` read again.
     n : int, optional
         Number of joints instead of the file's ``sampling.n``.
     text : str, optional
@@ -297,10 +296,9 @@ def load(
     InputError
         With every fault of the file, of the joint file and of measured data that it names.
     """
-    if isinstance(path, Mapping):
-        text = rewriting.as_text(path)
-        path = "study.toml"
-    file = Reading(Path(path), SECTIONS, text)
+    if is_read(path):
+        return path if n is None else load(path.path, n, path.text)
+    file = Reading(*rewriting.source(path, text), SECTIONS)
     if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
         file.data["sampling"]["n"] = n
     file.parts |= {name: own for name, own in (("joint", joint), ("joint2", joint2)) if own is not None}
@@ -330,15 +328,17 @@ def _read(file: Reading, names: Iterable[str]) -> None:
                 file.finish()
 
 
-def load_case(path: str | Path) -> Study:
-    """Read a case file: one joint with its errors, a study whose only joint has its fixed errors.
+def load_case(path: Given) -> Study:
+    """Read a case, see `load`: one joint with its errors, a study whose only joint has its fixed errors.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    file = Reading(Path(path), OF_CASE)
+    if is_read(path):
+        return path
+    file = Reading(*rewriting.source(path), OF_CASE)
     if "sampling" in file.data:
         remedy = (
             f"run it with: tolstat run {file.path}; a measured joint: tolstat evaluate {file.path} --in CSV --out CSV"

@@ -9,7 +9,10 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import getitem
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from tolstat.common.errors import input_error
 from tolstat.common.late import tomlkit
@@ -59,10 +62,39 @@ def as_text(sections: Mapping[str, Any]) -> str:
         When a value is of no type that TOML has.
     """
     try:
-        return tomlkit.dumps(sections)
+        return tomlkit.dumps(_plain(sections))
     except (tomlkit.exceptions.TOMLKitError, TypeError, ValueError) as error:
         found = f"a value cannot be written to a study: {error}"
         raise input_error("study", found, "give texts, numbers, true or false, lists and dictionaries") from error
+
+
+def _plain(value: Any) -> Any:
+    """Value with the types that TOML has, from those of NumPy, of pint and of paths."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if hasattr(value, "magnitude"):
+        return f"{value.magnitude} {value.units}"
+    return str(value) if isinstance(value, Path) else value
+
+
+def source(study: object, text: str | None = None) -> tuple[Path, str | None]:
+    """Path of a study file, and `text` in place of its own; of sections the path that faults name, and their TOML.
+
+    Raises
+    ------
+    InputError
+        When `study` is of another type, or as `as_text`.
+    """
+    if isinstance(study, Mapping):
+        return Path("study.toml"), as_text(study)
+    if isinstance(study, str | Path):
+        return Path(study), text
+    remedy = "give the path of its TOML file, its sections as dictionaries, or what tolstat.load returns"
+    raise input_error("study", f"an object of type {type(study).__name__} is none", remedy)
 
 
 def parsed(setting: str, place: str, example: str) -> tuple[list[str], Any]:

@@ -238,10 +238,10 @@ class Reading:
     ----------
     path : Path
         The file; paths in it start from its folder.
+    text : str or None
+        TOML to read instead of the file's content.
     sections : iterable of str
         Top-level keys that it may have.
-    text : str, optional
-        TOML to read instead of the file's content.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ class Reading:
         When the file is not readable TOML, or a joint file.
     """
 
-    def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
+    def __init__(self, path: Path, text: str | None, sections: Iterable[str]) -> None:
         self.path, self.place, self.folder = path, str(path), path.parent
         self._source, self._has_lines = read_text(path) if text is None else text, text is None
         self.text, self.data = self._source, read_toml(path, self._source)

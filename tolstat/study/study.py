@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -371,3 +371,12 @@ class Study:
         parts |= {name: part for name, part in optional.items() if part}
         identity: dict[str, Any] = leaves(parts | (self.listed.identity() if self.listed else {}))
         return dict(json.loads(json.dumps(identity)))
+
+
+Given = str | Path | Mapping[str, Any] | Study
+"""A study as it is given: path of its file, its sections, or what was read of them."""
+
+
+def is_read(study: Given) -> TypeGuard[Study]:
+    """Whether a study has been read already."""
+    return hasattr(study, "identity")

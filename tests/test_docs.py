@@ -191,7 +191,7 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
+@pytest.mark.parametrize("path", [DOCS / "python.md", DOCS / "further.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}

@@ -64,7 +64,7 @@ def test_the_nominal_joint_is_exported_if_asked_for(tmp_path):
         assert ("nominal" in lines[0].split(",")) == bool(options)
     refused = export(path, "--statistics", "-", "--nominal")
     assert refused.exit_code == 2
-    assert "--nominal is used with --csv" in refused.stderr
+    assert "--nominal is used with tables of joints" in refused.stderr
 
 
 def test_xarray_has_units_and_descriptions(tmp_path):

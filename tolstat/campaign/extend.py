@@ -127,7 +127,7 @@ def grow(
     write_new(store.path, document, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
 
 
-def merge(paths: Sequence[Path], out: Path) -> Merged:
+def merge(paths: Sequence[str | Path], out: str | Path) -> Merged:
     """Merge the files of slices into the file of the whole campaign, equal to that of a single run.
 
     A row may be in several files if its results are the same to the last bit. Rows that are pending in all files
@@ -135,9 +135,9 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths : sequence of str or Path
         Result files of slices, in any order.
-    out : Path
+    out : str or Path
         The file to make.
 
     Returns
@@ -151,6 +151,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     StoreError
         When a file cannot be used, or `out` cannot be created.
     """
+    out = Path(out)
     check_free(out, OTHER_FILE)
     with ExitStack() as opened:
         stores = [opened.enter_context(Reader.open(path)) for path in paths]

@@ -124,7 +124,7 @@ class Assembly:
     interval: tuple[float, float] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plan:
     """Predicted cost and precision of a campaign.
 
@@ -205,6 +205,12 @@ class Plan:
     tolerances: list[dict[str, Any]]
     exact: list[str]
     correlations: list[dict[str, Any]]
+
+    def __repr__(self) -> str:
+        return (
+            f"<plan of {self.rows} joints: about {self.seconds:.2g} s on {self.workers} cores, "
+            f"{self.file_bytes / 1e6:.2g} MB>"
+        )
 
     @property
     def seconds(self) -> float:

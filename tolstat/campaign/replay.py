@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,11 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
+from tolstat.store.result_file import viewed
 from tolstat.study import Given, load_case
+
+if TYPE_CHECKING:
+    import xarray
 
 KEPT = {"histories": "histories", "n_harmonics": "harmonics"}
 """Key of ``[output]`` that each parameter of the simulation has its value from."""
@@ -216,15 +221,17 @@ class Replay(NamedTuple):
     code: list[str]
 
 
-def replay(store: Reader, row: int) -> Replay:
+def replay(source: str | Path | Reader, row: int, point: str = "") -> Replay:
     """Simulate a joint of a campaign again and compare with the stored results.
 
     Parameters
     ----------
-    store : Reader
+    source : str, Path or Reader
         The result file.
     row : int
         Row of the campaign.
+    point : str
+        Operating point, of a file with several.
 
     Returns
     -------
@@ -235,6 +242,42 @@ def replay(store: Reader, row: int) -> Replay:
     InputError
         When the file has no such row, the row is pending, or this version cannot read the file's joint or options.
     """
+    with viewed(source) as view:
+        return _again(view.at(point).store, row)
+
+
+def histories(source: str | Path | Reader, rows: Sequence[int], point: str = "") -> xarray.DataArray:
+    """Loads of some joints over their last revolution, simulated again.
+
+    Parameters
+    ----------
+    source, point
+        As of `replay`.
+    rows : sequence of int
+        Rows of the campaign, such as those of `worst`.
+
+    Returns
+    -------
+    xarray.DataArray, (rows, theta, channels)
+        Columns of `CaseResult.to_pandas`; coordinates ``row``, ``theta`` (rad) and ``channel``. All rows need the same
+        number of steps per revolution.
+
+    Raises
+    ------
+    InputError
+        As `replay`; without xarray.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise input_error("histories", "xarray is not installed", "install it with: pip install xarray") from error
+    with viewed(source) as view:
+        frames = [_again(view.at(point).store, row).result.to_pandas().set_index("theta") for row in rows]
+    coords = {"row": list(rows), "theta": frames[0].index.to_numpy(), "channel": list(frames[0].columns)}
+    return xarray.DataArray(np.stack([frame.to_numpy(float) for frame in frames]), coords, name="loads")
+
+
+def _again(store: Reader, row: int) -> Replay:
     place = str(store.path)
     if row not in store.rows:
         found = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"

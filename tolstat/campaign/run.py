@@ -17,6 +17,7 @@ from tolstat.campaign import verify
 from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
+from tolstat.campaign.extend import extend as with_more
 from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.cores import available_cores
@@ -219,6 +220,44 @@ def run(
         if next(store.pending_blocks(last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
+
+
+def extend(
+    path: str | Path,
+    n: int,
+    study_path: Path | None = None,
+    workers: int | None = None,
+    progress: Reporter | bool = False,
+    tell: Tell = note,
+) -> Counts:
+    """Add the next joints of its sampling sequence to a campaign and simulate them, see `run`.
+
+    Joints already in the file do not change: it then equals that of a campaign that had `n` joints from the start.
+
+    Parameters
+    ----------
+    path : str or Path
+        Result file of a whole campaign.
+    n : int
+        New number of joints, without the nominal joint.
+    study_path : Path, optional
+        The study file, if the study text in the result file can no longer be read.
+    workers, progress, tell
+        As of `run`.
+
+    Returns
+    -------
+    Counts
+        Numbers of joints by status.
+
+    Raises
+    ------
+    InputError
+        When the campaign cannot be extended to `n` joints, or its study cannot be read.
+    StoreError, Interrupted, WorkerDied
+        As `run`.
+    """
+    return run(with_more(Path(path), n, study_path), path, workers, progress=progress, tell=tell)
 
 
 def _write_blocks(

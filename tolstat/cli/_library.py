@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tolstat.report import answer as reports
     from tolstat.report import evaluate as evaluating
     from tolstat.report import page, parts
-    from tolstat.store import recorded, result_file, revolutions, verification, what_if
+    from tolstat.store import exchange, recorded, result_file, revolutions, verification, what_if
     from tolstat.study import assumptions, crosses, mounting, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
@@ -48,8 +48,10 @@ else:
     accuracy, joints, drawings, dimensions, exceedance, fatigue = (Late(f"tolstat.questions.{name}") for name in names)
     names = ("report.answer", "report.evaluate", "report.page", "report.parts", "joint.sections")
     reports, evaluating, page, parts, sections = (Late(f"tolstat.{name}") for name in names)
-    names = ("recorded", "result_file", "revolutions", "verification", "what_if")
-    recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
+    names = ("exchange", "recorded", "result_file", "revolutions", "verification", "what_if")
+    exchange, recorded, result_file, revolutions, verification, what_if = (
+        Late(f"tolstat.store.{name}") for name in names
+    )
     names = ("assumptions", "crosses", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
     assumptions, crosses, mounting, points, rewriting, schemas, spectra, starter = (
         Late(f"tolstat.study.{name}") for name in names

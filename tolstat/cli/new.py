@@ -14,8 +14,6 @@ from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import Opt
 
-EXPONENT = 3.0
-"""Default Wöhler exponent."""
 RIGHT = 0.5 * math.pi
 """Right angle, rad."""
 
@@ -101,7 +99,7 @@ def new(
     elif signal is None:
         files = starter.write(path, joint or "cirelli2021")
     else:
-        files = [_write_cycle(path, signal, alpha, exponent or EXPONENT, base)]
+        files = [_write_cycle(path, signal, alpha, exponent or spectra.EXPONENT, base)]
     for file in files:
         say(f"wrote {file}")
     say(f"next: tolstat plan {quote(str(path))}")
@@ -109,13 +107,13 @@ def new(
 
 def _write_cycle(path: Path, signal: Path, alpha: float | None, exponent: float, base: Path | None) -> Path:
     """Write the study of the duty cycle in a signal, and print the duty cycle."""
-    cycle = spectra.read(signal, exponent, alpha)
+    cycle = spectra.spectrum(signal, exponent, alpha)
     content = spectra.text(cycle, signal, path, base)
     studies.load(path, text=content)  # its faults, before anything is written
     text.write(content, path)
     rows = [("point", "alpha", "speed", "torque", "time", "damage")]
     values = (cycle.alpha, cycle.speed, cycle.torque, cycle.time, cycle.damage)
-    for name, alpha, speed, torque, time, damage in zip(spectra.names(cycle), *values, strict=True):
+    for name, alpha, speed, torque, time, damage in zip(cycle.names, *values, strict=True):
         operation = f"{np.degrees(alpha):.4g} deg", f"{speed * 30 / np.pi:.4g} rpm", f"{torque:.4g} N m"
         rows.append((name, *operation, text.percent(time), text.percent(damage)))
     echo(text.align(rows))

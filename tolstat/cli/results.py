@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -214,6 +213,8 @@ def export(
     file: ResultPath,
     *,
     joints: Annotated[str | None, Opt("OUT", name="csv", writes=True)] = None,
+    parquet: Annotated[Path | None, Opt("OUT.parquet", writes=True)] = None,
+    xlsx: Annotated[Path | None, Opt("OUT.xlsx", writes=True)] = None,
     cycles: Annotated[str | None, Opt("OUT", name="pylife", writes=True)] = None,
     statistics: Annotated[str | None, Opt("OUT", writes=True)] = None,
     accepted: Accepted = math.nan,
@@ -222,15 +223,13 @@ def export(
 ) -> None:
     """Export joints, load cycles or statistics to files.
 
-    --csv writes one row per joint: its errors, then its results, in SI units. If the study lists its joints, case and
-    variant come first. Pending and failed joints are included; unknown values are empty. The first line has the names
-    of the columns, the second their units: read it with pandas.read_csv(OUT, header=[0, 1], index_col=0). The joint
-    without errors is left out unless --nominal is given.
+    --csv, --parquet and --xlsx write one row per joint: its errors, then its results, in SI units. If the study lists
+    its joints, case and variant come first. Pending and failed joints are included; unknown values are empty. The first
+    line has the names of the columns, the second their units, in Parquet they are metadata: read the CSV file with
+    pandas.read_csv(OUT, header=[0, 1], index_col=0). The joint without errors is left out unless --nominal is given.
 
-    For Parquet or Excel: tolstat.open(FILE).to_pandas() has the same columns.
-
-    If the study has several operating points, --statistics is of the worst of them, --pylife of the duty cycle, and
-    --csv has all rows at the first one, then at the next; the column point says at which.
+    If the study has several operating points, --statistics is of the worst of them, --pylife of the duty cycle, and a
+    table of joints has all rows at the first one, then at the next; the column point says at which.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
     versions; causes of a load: tolstat causes FILE --by LOAD --json.
@@ -244,6 +243,10 @@ def export(
     ----------
     joints : str, optional
         Write errors and results as CSV; - for standard output.
+    parquet : Path, optional
+        Write errors and results as Parquet.
+    xlsx : Path, optional
+        Write errors and results for Excel.
     cycles : str, optional
         Write load cycles as CSV for pyLife; - for standard output.
     statistics : str, optional
@@ -251,12 +254,13 @@ def export(
     nominal : bool
         Include the joint without errors, marked by a column.
     """
-    targets = [target for target in (joints, cycles, statistics) if target is not None]
+    tables = [str(path) for path in (parquet, xlsx) if path is not None]
+    targets = [*(target for target in (joints, cycles, statistics) if target is not None), *tables]
     repeated = not targets or len(set(targets)) < len(targets)
     wrong = {
-        "give one or more of --csv, --statistics and --pylife, each with its own file OUT": repeated,
+        "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each its own OUT": repeated,
         "--accept is used with --statistics only: add --statistics OUT": accepted == accepted and statistics is None,
-        "--nominal is used with --csv and --pylife: add one of them": nominal and targets == [statistics],
+        "--nominal is used with tables of joints and --pylife: add one of them": nominal and targets == [statistics],
     }
     for message, applies in wrong.items():
         if applies:
@@ -274,16 +278,9 @@ def export(
             if joints == "-":
                 list(library.result_file.in_blocks(store, nominal))  # damage is found before anything is printed
             n = store.n - (0 if nominal else store.first_sample)
-            write(joints, partial(_write_csv, store, nominal), f"{n} joints")
-
-
-def _write_csv(store: library.stores.Reader, nominal: bool, stream: TextIO) -> None:
-    """Write errors and results block by block."""
-    out = csv.writer(stream, lineterminator="\n")
-    for k, frame in enumerate(library.result_file.in_blocks(store, nominal)):
-        if k == 0:
-            out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
-        out.writerows(library.text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
+            write(joints, partial(library.exchange.write_csv, store, nominal=nominal), f"{n} joints")
+        for path in tables:
+            say(f"wrote {library.exchange.write_table(store, path, nominal)}")
 
 
 def report(

@@ -103,7 +103,7 @@ def replay(
         Operating point, such as cruise; needed if FILE has several.
     """
     with progress("simulation"), opened(file) as store:
-        again = library.replays.replay(store.at(point) if point else store, row)
+        again = library.replays.replay(store, row, point or "")
     facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     _deliver(again.result, facts, out, as_json)
     say(_verdict(again))

@@ -76,6 +76,12 @@ class Answer:
         names = [f"{kind} {', '.join(keys)}" for kind, keys in (("frames", self.tables), ("facts", self.facts)) if keys]
         return f"<answer {self.name!r}: {'; '.join([self.title, *names])}>"
 
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        """Pickle sentences and numbers: pictures, and columns as people see them, are functions."""
+        parts = (part for part in self.parts if isinstance(part, Sentence | Table))
+        kept = [replace(part, columns=()) if isinstance(part, Table) else part for part in parts]
+        return Answer, (self.name, self.title, kept, dict(self.facts))
+
     @property
     def tables(self) -> dict[str, Table]:
         """Tables by name."""

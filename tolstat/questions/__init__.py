@@ -16,7 +16,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tolstat.common.errors import StoreError
+from tolstat.common.errors import StoreError, input_error
 
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer, Asked
@@ -85,8 +85,11 @@ def told(answer_of: Callable[..., Answer]) -> Callable[..., Answer]:
     def answer(*views: View, **options: Any) -> Answer:
         from tolstat.display import rewording
         from tolstat.store.recorded import wording_of
+        from tolstat.store.view import View
 
         first = views[0] if views else options[next(iter(signature(answer_of).parameters))]
+        if not isinstance(first, View):
+            raise input_error(answer_of.__name__, f"{type(first).__name__} is no view", "give store.view()")
         return rewording.answer(answer_of(*views, **options), wording_of(first.store))
 
     return answer

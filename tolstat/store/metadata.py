@@ -95,6 +95,9 @@ class Metadata(BaseModel):
     created: str
     git_commit: str
 
+    def __repr__(self) -> str:
+        return f"<metadata of study {self.study_name!r}: {', '.join(type(self).model_fields)}>"
+
     @property
     def about(self) -> dict[str, Any]:
         """Title, version, date, seed and study, as results carry them into other programs."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ from tolstat.common.loads import loads_of
 from tolstat.common.tables import Status
 from tolstat.common.wording import row_of
 from tolstat.store import recorded
-from tolstat.store.layout import MEANINGS
+from tolstat.store.layout import MEANINGS, scale_of
 from tolstat.store.reader import Reader
 from tolstat.store.view import View
 
@@ -102,13 +102,15 @@ class ResultFile(Reader):
         whole.attrs = frames[0].attrs
         return whole
 
-    def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
+    def to_xarray(self, nominal: bool = False, histories: Sequence[str] = ()) -> xarray.Dataset:
         """Export errors and results along ``row``, with units and descriptions.
 
         Parameters
         ----------
         nominal : bool
             As in `to_pandas`.
+        histories : sequence of str
+            Histories of the file, such as ``cycles``, which are added with their axes.
 
         Returns
         -------
@@ -122,6 +124,8 @@ class ResultFile(Reader):
         ------
         InputError
             Without xarray.
+        StoreError
+            When the file does not hold these histories.
         """
         try:
             import xarray
@@ -138,6 +142,16 @@ class ResultFile(Reader):
             of_point = "point" in first and name in of_points
             values = (("point", "row"), np.stack(at_each)) if of_point else ("row", at_each[0])
             data[name] = (*values, units.get(name, {}))
+        slots = np.arange(0 if nominal else self.first_sample, self.n)
+        for name in histories:
+            each = [part.histories(name, slots) for part in self.each()]
+            spec = self.history_specs[name]
+            about = {"units": spec.unit, "description": spec.description}
+            whole = (("point", "row"), np.stack(each)) if "point" in first else (("row",), each[0])
+            data[name] = ((*whole[0], *spec.axes), whole[1], about)
+            for axis, size in zip(spec.axes, spec.shape, strict=True):
+                along, unit, meaning = scale_of(axis, size, self.mechanism)
+                coords[axis] = (axis, along, {"units": unit, "description": meaning})
         return xarray.Dataset(data, coords, self.metadata.about)
 
     @property
@@ -168,6 +182,9 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
     def __init__(self, view: View) -> None:
         self.view = view
+
+    def __repr__(self) -> str:
+        return f"<loads of {self.view.path.name!r}: {', '.join(self)}>"
 
     def __getitem__(self, name: str) -> pd.Series[float]:
         """Largest load over the revolution of each joint, SI.

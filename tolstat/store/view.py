@@ -63,6 +63,10 @@ class View:
         Study file that is read in place of the text in the result file.
     """
 
+    def __repr__(self) -> str:
+        at = f" at {', '.join(self.points)}" if any(self.points) else ""
+        return f"<view of {self.path.name!r}: {self.n} samples{at}>"
+
     def __init__(self, store: Reader, study_path: Path | None = None, parts: Sequence[View] = ()) -> None:
         self.store = store
         if not parts and store.point is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from tolstat.common.strict import read_text
 from tolstat.study import signals, starter
 from tolstat.study.placing import placed
 
+EXPONENT = 3.0
+"""Default Wöhler exponent."""
 NEEDED = ("time", "torque", "speed", "alpha")
 """Columns of the signal."""
 JOINT = "cirelli2021"
@@ -69,6 +71,27 @@ class DutyCycle(NamedTuple):
     left_out: int
     turns: float
     gaps: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the operating points."""
+        return [f"p{number}" for number in range(1, 1 + len(self.time))]
+
+    @property
+    def operation(self) -> list[dict[str, Any]]:
+        """Section ``[[operation]]`` of a study."""
+        return [
+            {
+                "name": name,
+                "share": float(f"{time / self.time.sum():.9g}"),
+                "alpha": f"{math.degrees(alpha):.6g} deg",
+                "speed": f"{speed * 30 / math.pi:.6g} rpm",
+                "torque": f"{torque:.6g} N*m",
+            }
+            for name, time, alpha, speed, torque in zip(
+                self.names, self.time, self.alpha, self.speed, self.torque, strict=True
+            )
+        ]
 
 
 def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: FloatArray, m: float) -> DutyCycle:
@@ -183,25 +206,34 @@ def _fewer(visits: NDArray[np.intp], torques: FloatArray) -> NDArray[np.intp]:
     return np.array(chosen[:VISITS], np.intp)
 
 
-def read(path: Path, m: float, alpha: float | None = None) -> DutyCycle:
-    """Duty cycle of a measured signal and, where it has none, a misalignment; see `signals.read` and `duty_cycle`.
+def spectrum(signal: str | Path, m: float = EXPONENT, alpha: float | None = None) -> DutyCycle:
+    """Find the duty cycle in a measured signal of torque and speed.
+
+    Parameters
+    ----------
+    signal : str or Path
+        Text table with time, torque, speed and, unless `alpha` is given, the misalignment; see `signals.read`.
+    m : float
+        Wöhler exponent by which damage is counted.
+    alpha : float, optional
+        Misalignment, rad.
+
+    Returns
+    -------
+    DutyCycle
+        Its `operation` is that section of a study.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    signal, gaps = signals.read(path, NEEDED, alpha)
+    values, gaps = signals.read(Path(signal), NEEDED, alpha)
     try:
-        cycle = duty_cycle(signal["time"], signal["torque"], signal["speed"], signal["alpha"], m)
+        cycle = duty_cycle(values["time"], values["torque"], values["speed"], values["alpha"], m)
     except ValueError as error:
-        raise input_error(path, str(error), "give the signal of a loaded shaft") from error
+        raise input_error(signal, str(error), "give the signal of a loaded shaft") from error
     return cycle._replace(gaps=gaps)
-
-
-def names(cycle: DutyCycle) -> list[str]:
-    """Names of the operating points."""
-    return [f"p{number}" for number in range(1, 1 + len(cycle.time))]
 
 
 def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -> str:
@@ -229,24 +261,12 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
     except tomlkit.exceptions.TOMLKitError as error:
         raise input_error(base, f"is not TOML: {error}", "give a study that tolstat plan reads") from error
     document.pop("operation", None)
-    points = [
-        {
-            "name": name,
-            "share": float(f"{time / cycle.time.sum():.9g}"),
-            "alpha": f"{math.degrees(alpha):.6g} deg",
-            "speed": f"{speed * 30 / math.pi:.6g} rpm",
-            "torque": f"{torque:.6g} N*m",
-        }
-        for name, time, alpha, speed, torque in zip(
-            names(cycle), cycle.time, cycle.alpha, cycle.speed, cycle.torque, strict=True
-        )
-    ]
-    document.append(tomlkit.key("operation"), tomlkit.item(points))
+    document.append(tomlkit.key("operation"), tomlkit.item(cycle.operation))
     output = document.setdefault("output", tomlkit.table())
     if output.get("histories", "none") == "none":
         output["histories"] = "cycles"
     if len(set(cycle.visits.tolist())) > 1:
-        visits = textwrap.fill(" ".join(names(cycle)[visit] for visit in cycle.visits), 100)
+        visits = textwrap.fill(" ".join(cycle.names[visit] for visit in cycle.visits), 100)
         sequence = {"points": tomlkit.string(visits, multiline=True), "revolutions": float(f"{cycle.turns:.6g}")}
         document.setdefault("fatigue", tomlkit.table())["sequence"] = sequence
     head = f"# Operating points, their shares and the order of their visits are from {source.name}.\n"

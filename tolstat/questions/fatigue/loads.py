@@ -20,7 +20,7 @@ from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import counting
 from tolstat.questions.fatigue.counting import ANY, CONFIDENCE, Counted, only
 from tolstat.store.view import View
-from tolstat.study.fatigue import counted_names
+from tolstat.study.fatigue import Fatigue, counted_names
 from tolstat.study.selection import Entry
 
 SHARES = (0.5, 0.9, 0.99)
@@ -121,19 +121,14 @@ def damages(loading: Counted, delivery: int = prediction.DELIVERY) -> Rows:
         joints), the fields of `analysis.estimates.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    lines, life = loading.settings.lines, loading.settings.revolutions
-    sums = {
-        channel: [
-            cycles.damage(part.of(channel).worst(line.k), line, life)[:, 0]
-            for part in (loading.cycles, loading.nominal)
-        ]
-        for channel, line in lines.items()
-        if channel in loading.cycles.channels
-    }
-    if len(sums) > 1:
-        sums[ANY] = [np.maximum.reduce(every) for every in zip(*sums.values(), strict=True)]
+    lines = loading.settings.lines
+    of_joints, of_nominal = (damage_sums(part, loading.settings) for part in (loading.cycles, loading.nominal))
+    if len(of_joints) > 1:
+        for sums in (of_joints, of_nominal):
+            sums[ANY] = np.maximum.reduce(list(sums.values()))
     rows = []
-    for channel, (damage, nominal) in sums.items():
+    for channel, damage in of_joints.items():
+        nominal = of_nominal[channel]
         sample = Sample.of(damage, loading.status, loading.design)
         m, _, N0, S0, *_ = lines.get(channel, [np.nan] * 4)
         row = {"channel": channel, "m": m, "S0": S0, "N0": N0, "nominal": only(nominal)}
@@ -141,6 +136,15 @@ def damages(loading: Counted, delivery: int = prediction.DELIVERY) -> Rows:
         row |= prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery) | {"confidence": CONFIDENCE}
         rows.append(row)
     return rows
+
+
+def damage_sums(part: cycles.Cycles, settings: Fatigue) -> dict[str, loads.FloatArray]:
+    """Damage sum of each joint in the service life, (n,), by channel that has an S–N line."""
+    lines = {channel: line for channel, line in settings.lines.items() if channel in part.channels}
+    return {
+        channel: cycles.damage(part.of(channel).worst(line.k), line, settings.revolutions)[:, 0]
+        for channel, line in lines.items()
+    }
 
 
 def spectrum(loading: Counted, channel: str) -> Rows:

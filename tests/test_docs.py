@@ -24,6 +24,7 @@ PAGES = [
     *sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "api"),
 ]
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+IN_PYTHON = [DOCS / "python.md", DOCS / "further.md"]
 OF_QUESTIONS = sorted(path.stem for path in (DOCS / "questions").glob("*.md"))
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
@@ -191,7 +192,9 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [DOCS / "python.md", DOCS / "further.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
+@pytest.mark.parametrize(
+    "path", [DOCS / "python.md", DOCS / "further.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name
+)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}

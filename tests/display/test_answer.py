@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from matplotlib.axes import Axes
 
 from tests.support.cells import body, head
-from tolstat.display.answer import Answer, Document, Sentence, Table
+from tolstat.display import drawing
+from tolstat.display.answer import Answer, Document, Sentence, Sheet, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.table import Column
 
@@ -73,6 +75,14 @@ def test_files_hold_every_row_and_no_formula(answer: Answer, tmp_path: Path) -> 
     assert files[0].read_text("utf-8") == "load,largest,n\ncross1.F,700.25,3\n'=F,,0\n"
     assert "A curve" in files[2].read_text("utf-8")
     assert files[3].read_text("utf-8") == "n = 1  # file_known.toml\n"
+
+
+def test_the_picture_alone_is_a_png(answer: Answer, tmp_path: Path) -> None:
+    (panels,) = (part for part in answer.parts if isinstance(part, Panels))
+    whole = replace(answer, parts=[*answer.parts, Sheet("all", lambda: drawing.sheet(panels.panels))])
+    assert [path.name for path in whole.write_picture(tmp_path / "file")] == ["file_all.png"]
+    assert [path.name for path in tmp_path.iterdir()] == ["file_all.png"]
+    assert answer.write_picture(tmp_path / "file") == []
 
 
 def test_frame_has_the_rows_by_name(answer: Answer) -> None:

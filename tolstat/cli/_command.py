@@ -264,7 +264,7 @@ def function_of(question: Question) -> Callable[..., None]:
             with progress(question.name):
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
             target = out and (out if only_study else out / stem)
-            deliver(answer, arguments["wide"], arguments["as_json"], target, only_study)
+            deliver(answer, arguments["wide"], arguments["as_json"], target, "documents" if only_study else "all")
 
     out_option = options.FolderOrStudy if question.study else options.Results if takes_study else options.Folder
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
 
 import typer
 
@@ -178,17 +178,22 @@ def progress(first: str = "") -> Iterator[Display]:
 
 
 def deliver(
-    answer: library.answers.Answer, wide: bool, as_json: bool = False, stem: Path | None = None, documents: bool = False
+    answer: library.answers.Answer,
+    wide: bool,
+    as_json: bool = False,
+    stem: Path | None = None,
+    which: Literal["all", "picture", "documents"] = "all",
 ) -> None:
     """Write the files of an answer, print it, and tell their names.
 
     On standard output it is JSON, or tables and leading sentences, with notes on standard error. With a
-    `stem` its files are written, see `Answer.write`, or its `documents` alone.
+    `stem` its files are written, or `which` of them: see `Answer.write`, `write_picture`, `write_documents`.
     """
     files: list[Path] = []
     if stem is not None:  # first: the reader of a pipe may end early
         with progress("files"):
-            files = answer.write_documents(stem) if documents else answer.write(stem)
+            write = {"all": answer.write, "picture": answer.write_picture, "documents": answer.write_documents}
+            files = write[which](stem)
     if as_json:
         print_json(answer.values())
     else:

@@ -103,11 +103,12 @@ def run(
     Simulates the joints that are pending in the result file, which is created if missing. To resume after an
     interruption (Ctrl-C, kill, power failure), run the same command again.
 
-    With --set the study is run with another value of a key of its sections joint, operation, sampling or output: give
-    --out, too, and the same --set again to resume.
+    With --set the study is run with another value of a key of its sections joint, mechanism, operation, sampling or
+    output: give --out, too, and the same --set again to resume.
 
     Prints the share of joints above each limit (see tolstat report) and of those that keep all limits, why joints have
-    no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
+    no valid load, and the next command. Writes the result file, and beside it a picture of the curves; for CSV tables
+    and SVG: tolstat report FILE.
 
     Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
 
@@ -271,7 +272,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         if report:
             with progress("report"):
                 answer = library.reports.report(store.view())
-            deliver(answer, wide, stem=path.with_suffix(""))
+            deliver(answer, wide, stem=path.with_suffix(""), which="picture")
         without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
         for text in library.remedy.in_words(without_load):
             say(text)

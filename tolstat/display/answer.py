@@ -139,6 +139,13 @@ class Answer:
                 files.append(text.write(part.text(path), path))
         return files
 
+    def write_picture(self, stem: Path) -> list[Path]:
+        """Write the first sheet alone, as PNG, see `write`; nothing without one."""
+        for part in self.parts:
+            if isinstance(part, Sheet):
+                return style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"), (".png",))
+        return []
+
     def write_documents(self, path: Path) -> list[Path]:
         """Write the documents alone, see `write`; the ending of `path`, if it has one, is written as it is there."""
         documents = [part for part in self.parts if isinstance(part, Document)]

@@ -103,7 +103,7 @@ def read(store: ResultFile, joint: Joint, rows: NDArray[np.intp], gamma: Array) 
     return Main(
         joint,
         operation,
-        store.design()["case"][rows],
+        store.design["case"][rows],
         operating(operation, errors)["alpha"],
         errors,
         store.results()[rows],

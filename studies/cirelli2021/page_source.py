@@ -165,7 +165,7 @@ def matching(store: ResultFile) -> bool:
         return False
     if not {"loads", "contact", "tau"} <= set(store.history_specs):
         return False
-    design, alpha = store.design(), operating_points(store)["alpha"]
+    design, alpha = store.design, operating_points(store)["alpha"]
     rows = _kept(design, alpha)
     rows = rows[design["variant"][rows] == 0]
     names = tuple(store.case_names[i] for i in np.unique(design["case"][rows]))
@@ -185,7 +185,7 @@ def _kept(design: NDArray[np.void], alpha: Array) -> NDArray[np.intp]:
 
 def read(store: ResultFile) -> PaperStudy:
     """Take the study from its file; see `matching`."""
-    design, results = store.design(), store.results()
+    design, results = store.design, store.results()
     alpha = operating_points(store)["alpha"]
     gamma = relative_errors(results, design["group"])
     base = Joint.model_validate(store.joint)

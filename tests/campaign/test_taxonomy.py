@@ -88,7 +88,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
     with ResultFile.open(path) as store:
-        variant = store.design()["variant"]
+        variant = store.design["variant"]
         family = [store.variants[number].family for number in variant]
         ended = {name: Status(s).label for name, s in zip(family, store.status(), strict=True)}  # the last one counts
         results = store.results()

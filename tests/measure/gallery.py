@@ -333,7 +333,7 @@ def fuzz(folder: Path) -> None:
 def hard_cases(folder: Path) -> None:
     """Draw the largest force of any bushing of each case with errors, coloured by its status."""
     with tolstat.open(folder / "hard_cases.h5") as store:
-        results, design = store.results(), store.design()
+        results, design = store.results(), store.design
         variants, cases = store.variants, store.case_names
     rows = [row for row, place in enumerate(design) if cases[place["case"]] != "ideal"]
     results, design = results[rows], design[rows]

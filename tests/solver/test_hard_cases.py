@@ -74,7 +74,7 @@ def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     with ResultFile.open(hard) as store:
-        results, design = store.results(), store.design()
+        results, design = store.results(), store.design
         family = np.array([v.family for v in store.variants])[design["variant"]]
         case = np.array(store.case_names)[design["case"]]
     assert_honest(results)
@@ -95,7 +95,7 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
 
 def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
     with ResultFile.open(hard) as store:
-        results, design = store.results(), store.design()
+        results, design = store.results(), store.design
         family = [store.variants[i].family for i in design["variant"]]
     for dear in results[np.array(family) == "85 deg, 5 revolutions"]:
         assert dear["status"] == Status.NEWTON_FAILED

@@ -5,9 +5,10 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.questions.test_causes import TEXT, made
+from tests.support import synthetic
 from tests.support.of_cardan import LOAD_FIELDS
 from tolstat.cli import app
-from tolstat.store import ResultFile, reader, view, worst
+from tolstat.store import ResultFile, reader, recorded, view, worst
 
 BLOCK = 256
 
@@ -79,3 +80,15 @@ def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
         np.testing.assert_array_equal(made.errors(samples[:4]), errors[samples[:4]])
         blocks = list(made.error_blocks(["pin2.offset_z"]))
         np.testing.assert_array_equal(np.concatenate([b["pin2.offset_z"] for b in blocks]), errors["pin2.offset_z"])
+
+
+def test_the_list_of_variants_is_read_once(tmp_path, read):
+    """Parameters of a sweep take a time that grows with its rows, not with their square."""
+    swept = '"pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm"'
+    assert swept in synthetic.SWEEP
+    text = synthetic.SWEEP.replace(swept, '"cross.R" = { from = "40 mm", to = "60 mm"')
+    with ResultFile.open(synthetic.store(tmp_path, text, "sweep")) as store:
+        before = len(read)
+        params = recorded.parameters(store, np.arange(store.n))
+    assert len(np.unique(params["R"])) == len(params)
+    assert len(read) - before == 2  # errors, variants

@@ -149,7 +149,7 @@ def test_other_methods_have_one_joint(tmp_path: Path) -> None:
     with Writer.create(tmp_path / "a.h5", s, [sampling.draw(s)]) as store:
         assert (store.variants, store.case_names) == ((), ())
         with pytest.raises(StoreError, match="has no list of variants"):
-            store.design()
+            store.design
 
 
 def test_identity_tells_what_decides_the_numbers(tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_variants_can_have_numbers_of_stations_of_their_own(tmp_path: Path) -> N
     s = load(tmp_path, text=head.replace('contact.z = "20 mm"\n', "") + cases + variants)
     assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
     with ResultFile.open(tmp_path / "a.h5") as store:
-        results, variant = store.results(), store.design()["variant"]
+        results, variant = store.results(), store.design["variant"]
         params = recorded.parameters(store, np.arange(s.rows))
     assert params["n_stations"][:, 0].tolist() == [(3, 2, 5)[v] for v in variant]
     again = simulation.simulate_rows(params, s.solver.options()).results
@@ -209,7 +209,7 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
     s = small(tmp_path)
     assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
     with ResultFile.open(tmp_path / "a.h5") as store:
-        results, design, errors = store.results(), store.design(), store.errors()
+        results, design, errors = store.results(), store.design, store.errors()
         assert store.variants == s.variants
         assert store.case_names == s.case_names
     assert design.tolist() == s.design.tolist()

@@ -165,7 +165,7 @@ def merge(paths: Sequence[str | Path], out: str | Path) -> Merged:
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
         if stores[0].variants:
-            tables["design"] = (s.design()[begin:] for s, begin in shares)
+            tables["design"] = (s.design[begin:] for s, begin in shares)
         if drawn_columns(stores[0].sampling):
             tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
         write_new(out, document, OTHER_FILE, tables, partial(_copy_results, sources=stores))

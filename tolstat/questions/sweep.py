@@ -289,7 +289,7 @@ def cases(view: View) -> Answer:
 
 
 def _listed(store: Reader) -> Rows:
-    design, results = store.design(), store.results()
+    design, results = store.design, store.results()
     work = refinement.work(results)
     variants = [store.variants[i] for i in design["variant"]]
     columns: dict[str, Sequence[Any]] = {

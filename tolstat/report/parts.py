@@ -45,7 +45,7 @@ def of_case(case: Study, result: CaseResult) -> Answer:
 def of_listed(view: View) -> list[Part]:
     """Parts of an answer on the joints that a study lists, see `parts`."""
     loads = {name: view.load(name).values for name in names_of(view.limits, view.mechanism) if name in view.kept_loads}
-    design = view.store.design()
+    design = view.store.design
     labels = [view.store.case_names[number] for number in design["case"]]
     if len(set(design["group"])) > 1:
         labels = [f"{label} ({number})" for number, label in enumerate(labels)]

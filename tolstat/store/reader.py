@@ -10,6 +10,7 @@ import logging
 import time
 from collections.abc import Iterator, Sequence
 from copy import copy
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -285,6 +286,7 @@ class Reader:
         dtype = tables(self.mechanism).ERROR
         return self._table("errors", error_columns(self.mechanism), dtype, slots, fields or dtype.names or ())
 
+    @cached_property
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of every joint, (n,) table DESIGN.
 

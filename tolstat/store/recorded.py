@@ -126,7 +126,7 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
     names = [name for names, *_ in store.identity.get("sweep", []) for name in names if name in KEYS]
     if not names:
         return {}
-    nominal, number = validate(Joint, store.joint, f"{store.path}: joint"), store.design()["variant"]
+    nominal, number = validate(Joint, store.joint, f"{store.path}: joint"), store.design["variant"]
     joints = [varied(nominal, variant.values) for variant in store.variants]
     values = {name: [get(joint, name) for joint in joints] for name in names}
     return {
@@ -155,7 +155,7 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
         When this version cannot read the joint in the file.
     """
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
-    numbers = np.unique(store.design()["variant"]) if store.variants else ()
+    numbers = np.unique(store.design["variant"]) if store.variants else ()
     changed = [store.variants[number].values for number in numbers] or [{}]
     laws = [values.get("contact.law", nominal.contact.law) for values in changed]
     if joint2 := joint2_of(store):
@@ -174,7 +174,7 @@ def note_on_mounting(store: Reader) -> str:
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, ascending, (m,) table PARAM."""
     params, errors = np.empty(len(rows), tables(store.mechanism).PARAM), pick(store.errors, rows)
-    number = store.design()["variant"][rows] if store.variants else np.zeros(len(rows), np.intp)
+    number = store.design["variant"][rows] if store.variants else np.zeros(len(rows), np.intp)
     for variant in np.unique(number):
         here = number == variant
         first = int(rows[here][0])
@@ -214,7 +214,7 @@ def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
 
 def _values(store: Reader, row: int) -> dict[str, Any]:
     """Values that define the variant of file slot `row`; empty if all rows have the study's joint."""
-    return store.variants[store.design()["variant"][row]].values if store.variants else {}
+    return store.variants[store.design["variant"][row]].values if store.variants else {}
 
 
 def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Study:

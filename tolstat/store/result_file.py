@@ -269,8 +269,8 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
 def _listed(store: Reader) -> dict[str, NDArray[Any]]:
     """Columns of joints that the study lists: case and family by name, variant and group by index; or of a sweep."""
     if not store.case_names:
-        return recorded.swept(store) | {"variant": store.design()["variant"]} if store.variants else {}
-    design = store.design()
+        return recorded.swept(store) | {"variant": store.design["variant"]} if store.variants else {}
+    design = store.design
     families = np.array([variant.family for variant in store.variants], dtype=object)
     return {
         "case": np.array(store.case_names, dtype=object)[design["case"]],

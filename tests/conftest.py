@@ -161,7 +161,7 @@ def in_workers(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Write reports without pictures, and pages without sections below the verdict: they take most of the time."""
-    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
+    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem, suffixes=(): [])
     monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, notes: None)
     monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
 

@@ -211,7 +211,7 @@ def test_which_joint_a_row_is_is_checked(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, synthetic.HEAD + listed)
     damage.flip_in(path, "design/case", 1, 0)
     with ResultFile.open(path) as store, pytest.raises(StoreError, match=r"damaged: design/case of rows 0:3"):
-        store.design
+        _ = store.design
     with pytest.raises(StoreError, match="damaged: design/case"):
         Writer.open(path)
 

@@ -149,7 +149,7 @@ def test_other_methods_have_one_joint(tmp_path: Path) -> None:
     with Writer.create(tmp_path / "a.h5", s, [sampling.draw(s)]) as store:
         assert (store.variants, store.case_names) == ((), ())
         with pytest.raises(StoreError, match="has no list of variants"):
-            store.design
+            _ = store.design
 
 
 def test_identity_tells_what_decides_the_numbers(tmp_path: Path) -> None:

@@ -16,5 +16,5 @@ def read_all(path: Path) -> int:
         for name in store.history_specs:
             store.histories(name)
         if store.case_names:
-            store.design
+            _ = store.design
         return store.n

@@ -6,8 +6,6 @@ cluster again. A cluster of this machine whose workers do not come back leaves a
 
 from __future__ import annotations
 
-import fcntl
-import os
 import queue
 import tempfile
 import threading
@@ -16,12 +14,15 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import InputError, input_error
+from tolstat.common.late import filelock
+from tolstat.kernel.simd.cache_folder import user
 from tolstat.store.metadata import differing, versions
 
 if TYPE_CHECKING:
@@ -133,8 +134,7 @@ _versions = cache(versions)
 @cache
 def _prepare(prepare: Callable[[], object]) -> None:
     """Prepare this process once; processes of a machine take turns, since they may compile into one cache."""
-    with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with filelock.FileLock(Path(tempfile.gettempdir(), f"tolstat-{user()}.lock")):
         prepare()
 
 

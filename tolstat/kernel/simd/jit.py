@@ -17,6 +17,7 @@ from tolstat.kernel.simd.unit import Kernel
 
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 """No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""
+OPTIONS |= {"nogil": True}  # so that a worker notices the end of its parent while a kernel runs
 
 
 class Locator(UserProvidedCacheLocator):

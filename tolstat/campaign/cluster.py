@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import queue
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -39,9 +38,6 @@ FETCH_S = 60.0
 """Time limit for fetching a result, s."""
 LOOPBACK = "127.0.0.1"
 """Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
-
-_ONE_AT_A_TIME = threading.Lock()
-"""Lock: a simulation uses work arrays of the process, which the threads of a worker must not use at the same time."""
 
 
 def map_on_cluster(
@@ -121,11 +117,10 @@ def map_on_cluster(
 
 
 def _process_block(work: Work[Any, Any], expected: Mapping[str, str], block: Any) -> Any:
-    """Process a block in a worker, one block at a time."""
+    """Process a block in a worker."""
     check(expected, _versions(), "a Dask worker")
-    with _ONE_AT_A_TIME:
-        _prepare(work.prepare)
-        return work.function(block)
+    _prepare(work.prepare)
+    return work.function(block)
 
 
 _versions = cache(versions)

@@ -281,14 +281,15 @@ def _reason(failure: str | Exception) -> str:
 @contextmanager
 def signals_blocked() -> Iterator[None]:
     """Let processes started inside inherit blocked signals, until they ignore them; Windows cannot block any."""
-    if not hasattr(signal, "pthread_sigmask"):
+    system: Any = signal
+    if not hasattr(system, "pthread_sigmask"):
         yield
         return
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    mask = system.pthread_sigmask(system.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        system.pthread_sigmask(system.SIG_SETMASK, mask)
 
 
 def serve(connection: Connection, prepare: Callable[[], object]) -> None:

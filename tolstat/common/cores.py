@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection
 from numbers import Integral
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from tolstat.common.errors import input_error
 
@@ -96,7 +96,7 @@ class Forked(Generic[T]):
         self._results: list[T] = []
         self._process = None
         if forks and CAN_FORK:
-            context = multiprocessing.get_context("fork")
+            context: Any = multiprocessing.get_context("fork")
             self._end, other = context.Pipe(duplex=False)
             self._process = context.Process(target=_send, args=(function, other, self._end), daemon=True)
             self._process.start()

@@ -50,7 +50,7 @@ def done(path: Path) -> int:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a space and an umlaut in its name; in it the main job, and one of few joints at a cheap fidelity."""
+    """A folder with a space and an umlaut in its name; in it the main job, and one of few joints, cheaper."""
     path = tmp_path_factory.mktemp("windows") / "eine Prüfung"
     path.mkdir()
     text = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")

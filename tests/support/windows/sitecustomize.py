@@ -23,14 +23,14 @@ import psutil  # noqa: F401
 
 MODULES = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 NAMES = """
-    chown chroot confstr fchmod fchown fork forkpty fpathconf fstatvfs getegid geteuid getgid getgroups getloadavg getpgid
-    getpgrp getpriority getresgid getresuid getsid getuid initgroups killpg lchown lockf major makedev minor mkfifo mknod
-    nice openpty pathconf pipe2 posix_fadvise posix_fallocate posix_spawn posix_spawnp pread preadv pwrite pwritev readv
-    register_at_fork sched_getaffinity sched_setaffinity sched_yield sendfile setegid seteuid setgid setgroups setpgid
-    setpriority setresgid setresuid setsid setuid statvfs sync sysconf tcgetpgrp tcsetpgrp ttyname uname wait wait3 wait4
-    waitid writev O_ACCMODE O_ASYNC O_CLOEXEC O_DIRECTORY O_DSYNC O_NDELAY O_NOCTTY O_NOFOLLOW O_NONBLOCK O_PATH O_RSYNC
-    O_SYNC O_TMPFILE
-""".split()
+    chown chroot confstr fchmod fchown fork forkpty fpathconf fstatvfs getegid geteuid getgid getgroups getloadavg
+    getpgid getpgrp getpriority getresgid getresuid getsid getuid initgroups killpg lchown lockf major makedev minor
+    mkfifo mknod nice openpty pathconf pipe2 posix_fadvise posix_fallocate posix_spawn posix_spawnp pread preadv
+    pwrite pwritev readv register_at_fork sched_getaffinity sched_setaffinity sched_yield sendfile setegid seteuid
+    setgid setgroups setpgid setpriority setresgid setresuid setsid setuid statvfs sync sysconf tcgetpgrp tcsetpgrp
+    ttyname uname wait wait3 wait4 waitid writev O_ACCMODE O_ASYNC O_CLOEXEC O_DIRECTORY O_DSYNC O_NDELAY O_NOCTTY
+    O_NOFOLLOW O_NONBLOCK O_PATH O_RSYNC O_SYNC O_TMPFILE
+"""
 """Names of `os` that Windows lacks."""
 SIGNALS = ("SIGABRT", "SIGFPE", "SIGILL", "SIGINT", "SIGSEGV", "SIGTERM")
 """Signals that it has."""
@@ -50,7 +50,7 @@ def take_away():
     sys.meta_path.insert(0, Missing)
     for name in MODULES:
         sys.modules.pop(name, None)
-    for name in NAMES:
+    for name in NAMES.split():
         if hasattr(os, name):
             delattr(os, name)
     numbers = {name: int(getattr(signal, name)) for name in SIGNALS}

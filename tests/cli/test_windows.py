@@ -18,9 +18,8 @@ from tests.conftest import CHEAP
 from tests.support.environment import ROOT, environment
 from tolstat import run, study
 from tolstat.common.shell import quote
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, Writer
 
-JOINTS = 1025
 REFUSED = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[. ]$')
 """What Windows refuses in the name of a file."""
 simulated = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs Linux")
@@ -54,8 +53,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("windows") / "eine Prüfung"
     path.mkdir()
     text = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
-    few = text.replace("n = 1024", "n = 60").replace("[sampling]", f"[output]\n{CHEAP}")
-    for name, content in {"main.toml": text, "few.toml": few}.items():
+    few = text.replace("n = 1024", "n = 200").replace("[sampling]", f"[output]\n{CHEAP}")
+    for name, content in {"main.toml": text.replace("n = 1024", "n = 4000"), "few.toml": few}.items():
         (path / name).write_text(content, encoding="utf-8", newline="\n")
     return path
 
@@ -70,18 +69,17 @@ def whole(folder: Path) -> Path:
 @simulated
 @pytest.mark.slow
 def test_a_campaign_is_interrupted_and_resumed(folder: Path, tmp_path: Path) -> None:
-    """Meanwhile others may read its file, and none may write it; in the end it has the bytes of any other run."""
+    """Meanwhile others may read its file; in the end it has the bytes of any other run."""
     path = folder / "main.h5"
-    with process(folder, "run", "main.toml", "--workers", "2", "--block", "8") as running:
+    with process(folder, "run", "main.toml", "--workers", "2") as running:
         while not (path.exists() and done(path)):
             assert running.poll() is None, running.communicate()
             time.sleep(0.02)
-        assert "is being written by another process" in command(folder, "run", "main.toml", code=2)
         running.send_signal(signal.SIGINT)
         said = running.communicate()[1]
     assert running.returncode == 130
     assert "to resume, run the same command again" in said
-    assert 0 < done(path) < JOINTS
+    assert 0 < done(path) < 4001
     command(folder, "run", "main.toml", "--workers", "2")
     run(study.load(folder / "main.toml"), tmp_path / "a.h5")
     assert datasets(path) == datasets(tmp_path / "a.h5")
@@ -90,17 +88,19 @@ def test_a_campaign_is_interrupted_and_resumed(folder: Path, tmp_path: Path) -> 
 @simulated
 @pytest.mark.slow
 def test_slices_are_merged(folder: Path, whole: Path) -> None:
-    for name, rows in {"a.h5": "0:20", "b.h5": "20:61"}.items():
+    for name, rows in {"a.h5": "0:20", "b.h5": "20:201"}.items():
         command(folder, "run", "few.toml", "--rows", rows, "--out", name)
     command(folder, "merge", "a.h5", "b.h5", "--out", "merged.h5")
-    assert datasets(folder / "merged.h5") == datasets(whole)
+    merged, expected = datasets(folder / "merged.h5"), datasets(whole)  # which has checks of the numerical error, too
+    assert merged == {name: expected[name] for name in merged}
+    assert {name.partition("/")[0] for name in merged} >= {"errors", "results", "histories"}
 
 
 @simulated
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("distributed") is None, reason="needs Dask")
 def test_a_cluster_gives_the_same_bytes(folder: Path, whole: Path) -> None:
-    command(folder, "run", "few.toml", "--out", "cluster.h5", "--executor", "dask", "--workers", "2", "--block", "20")
+    command(folder, "run", "few.toml", "--out", "cluster.h5", "--executor", "dask", "--workers", "2")
     assert datasets(folder / "cluster.h5") == datasets(whole)
 
 
@@ -119,6 +119,16 @@ def test_files_are_those_of_any_system(folder: Path, whole: Path) -> None:
         if path.suffix in (".toml", ".csv", ".json", ".html", ".svg"):
             assert b"\r" not in path.read_bytes(), path.name
             path.read_text(encoding="utf-8")
+
+
+@simulated
+@pytest.mark.slow
+def test_one_process_writes_a_file(folder: Path, whole: Path) -> None:
+    with Writer.open(whole) as store:
+        store.begin_session(0)
+        assert "is being written by another process" in command(folder, "run", "few.toml", code=2)
+        assert "running: no" not in command(folder, "status", "few.h5")
+    assert "running: no" in command(folder, "status", "few.h5")
 
 
 @simulated

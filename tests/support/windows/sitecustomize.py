@@ -1,27 +1,21 @@
 """Takes away from Python what it does not have on Windows: a process imports this first if the folder is on its path.
 
-Libraries that have code of their own for Windows are imported before, and keep what they have by then.
+Libraries have code of their own for Windows: they keep what they use here, and tolstat alone does without.
 """
 
 import builtins
 import enum
 import glob
 import io
-import multiprocessing.connection
 import multiprocessing.context
-import multiprocessing.popen_spawn_posix
-import multiprocessing.resource_tracker
 import os
-import shutil
 import signal
-import subprocess
 import sys
 from contextlib import suppress
 
 import filelock
-import psutil  # noqa: F401
 
-MODULES = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
+MODULES = {"fcntl", "grp", "pwd", "resource", "syslog", "termios"}
 NAMES = """
     chown chroot confstr fchmod fchown fork forkpty fpathconf fstatvfs getegid geteuid getgid getgroups getloadavg
     getpgid getpgrp getpriority getresgid getresuid getsid getuid initgroups killpg lchown lockf major makedev minor
@@ -36,31 +30,38 @@ SIGNALS = ("SIGABRT", "SIGFPE", "SIGILL", "SIGINT", "SIGSEGV", "SIGTERM")
 """Signals that it has."""
 
 
-class Missing:
-    """Finds that a module is not there."""
+def by_tolstat(names):
+    """Whether code with such global names is not that of a library, which knows the system that it is on."""
+    return names.get("__name__", "").startswith("tolstat")
 
-    @staticmethod
-    def find_spec(name, path=None, target=None):
-        if name in MODULES:
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+def hide(module, names):
+    """Take names from a module."""
+    kept = {name: vars(module).pop(name) for name in names if hasattr(module, name)}
+
+    def find(name):
+        if name not in kept or by_tolstat(sys._getframe(1).f_globals):
+            raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}", name=name, obj=module)
+        return kept[name]
+
+    module.__getattr__ = find
 
 
 def take_away():
     """Remove modules, names of `os` and signals."""
-    sys.meta_path.insert(0, Missing)
-    for name in MODULES:
-        sys.modules.pop(name, None)
-    for name in NAMES.split():
-        if hasattr(os, name):
-            delattr(os, name)
+    real = builtins.__import__
+
+    def imported(name, names=None, *rest, **options):
+        if name in MODULES and by_tolstat(names or {}):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return real(name, names, *rest, **options)
+
+    builtins.__import__ = imported
+    hide(os, NAMES.split())
     numbers = {name: int(getattr(signal, name)) for name in SIGNALS}
-    for name in [name for name in vars(signal) if name.startswith(("SIG", "pthread_", "sig")) and name != "signal"]:
-        if name not in (*SIGNALS, "SIG_DFL", "SIG_IGN", "Signals"):
-            delattr(signal, name)
+    others = [name for name in vars(signal) if name.startswith(("SIG", "pthread_")) and name not in SIGNALS]
+    hide(signal, {*others} - {"SIG_DFL", "SIG_IGN"})
     signal.Signals = enum.IntEnum("Signals", numbers)
-    shutil._use_fd_functions = multiprocessing.resource_tracker._HAVE_SIGMASK = False
-    for popen in (subprocess.Popen, multiprocessing.popen_spawn_posix.Popen):
-        popen.kill = lambda self: os.kill(self.pid, 9)  # as TerminateProcess does
 
 
 def spawn_only():
@@ -109,7 +110,7 @@ def files_in_use_stay():
     open_handle, release = os.open, filelock.FileLock._release
 
     def opened(path, *arguments, **options):
-        if os.path.isdir(path):
+        if os.path.isdir(path) and by_tolstat(sys._getframe(1).f_globals):
             raise PermissionError(13, "Permission denied", path)
         return open_handle(path, *arguments, **options)
 

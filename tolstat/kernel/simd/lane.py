@@ -19,7 +19,7 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, overload, regi
 
 FEATURES = (config.CPU_FEATURES if config.CPU_FEATURES is not None else get_host_cpu_features().flatten()).split(",")
 """What the processor that Numba compiles for can do; ``NUMBA_CPU_NAME`` and ``NUMBA_CPU_FEATURES`` name another one."""
-WIDTH = 8 if "+avx512f" in FEATURES else 4 if "+avx" in FEATURES and config.ENABLE_AVX else 2
+WIDTH = 8 if "+avx512f" in FEATURES else 4 if "+avx" in FEATURES else 2
 """Number of lanes: doubles in a register of 512, 256 or 128 bits (SSE2, NEON). No result depends on it."""
 
 DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)

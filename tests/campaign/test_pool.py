@@ -245,7 +245,7 @@ def running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     status = Path(f"/proc/{pid}/stat")
-    return not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    return not status.exists() or status.read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
 
 
 def test_available_cores_is_what_this_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:

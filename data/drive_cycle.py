@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=100.0)
     given = parser.parse_args()
     values = signal(given.minutes, given.rate)
-    with given.out.open("w", encoding="utf-8") as file:
+    with given.out.open("w", encoding="utf-8", newline="\n") as file:
         file.write("# Made by data/drive_cycle.py, not measured.\ntime [s],torque [N*m],speed [rpm],alpha [deg]\n")
         np.savetxt(file, values, fmt=["%.2f", "%.1f", "%.1f", "%.2f"], delimiter=",")
 

@@ -58,7 +58,7 @@ def list_questions(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     listed = "\n".join(f"   tolstat.{name}" for name in public)
     text = f"# Questions\n\n```{{eval-rst}}\n.. autosummary::\n   :toctree: .\n\n{listed}\n```\n"
-    (folder / "questions.md").write_text(text, encoding="utf-8")
+    (folder / "questions.md").write_text(text, encoding="utf-8", newline="\n")
 
 
 def add_tree(app: Any, docname: str, source: list[str]) -> None:

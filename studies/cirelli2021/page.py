@@ -22,7 +22,7 @@ from studies.cirelli2021 import page_equations as paper_equations
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_main import revolutions
 from studies.cirelli2021.page_source import PaperStudy
-from tolstat.common.files import atomic_write
+from tolstat.common.files import write_text
 from tolstat.display import style, text
 
 DPI = 110
@@ -84,8 +84,7 @@ def write(study: PaperStudy, path: Path) -> None:
     environment.filters["picture"] = _picture
     environment.filters["number"] = _number
     page = environment.get_template("paper.html.j2").render(context(study))
-    with atomic_write(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def context(study: PaperStudy) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write
+from tolstat.common.files import write_text
 from tolstat.store.recorded import perturbed
 from tolstat.study import Study
 
@@ -157,5 +157,4 @@ def split_page(path: Path, name: str) -> tuple[str, str]:
 def insert(path: Path, name: str, part: str) -> None:
     """Replace part `name` of a file by the text `part`; raises as `split_page` does."""
     head, tail = split_page(path, name)
-    with atomic_write(path) as temporary:
-        temporary.write_text(f"{head}\n\n{part}\n\n{tail}", encoding="utf-8")
+    write_text(path, f"{head}\n\n{part}\n\n{tail}")

@@ -17,7 +17,7 @@ from studies.precision.measuring import markdown, versions
 from studies.precision.points import build, cost, leaders
 from studies.precision.runs import Run
 from studies.precision.setup import Setup
-from tolstat.common.files import atomic_write
+from tolstat.common.files import atomic_write, write_text
 from tolstat.display import style, table
 
 OWN_MARKERS = ("o", "s", "D", "v", "*", "P")
@@ -74,8 +74,7 @@ def write(runs: Sequence[Run], setup: Setup, stem: Path) -> str:
     style.save(figure(points, truth, subtitle), stem)
     with atomic_write(stem.with_suffix(".csv")) as temporary:
         points.to_csv(temporary, index=False, float_format="%.4g", encoding="utf-8", lineterminator="\n")
-    with atomic_write(stem.with_suffix(".md")) as temporary:
-        temporary.write_text(page(points, truth, subtitle, f"{stem.name}.png"), encoding="utf-8")
+    write_text(stem.with_suffix(".md"), page(points, truth, subtitle, f"{stem.name}.png"))
     ahead = _ahead(points, truth, "loads")
     rows = ahead.to_dict("records")
     return table.fitted(table.plain(rows), rows)[0]

@@ -123,8 +123,8 @@ def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[st
 def limited(path: Path, size: int) -> str:
     """Run a campaign in a process whose files cannot grow beyond `size` bytes; gives what it says."""
     code = (
-        "import resource, sys; from pathlib import Path; from tests.support import fakes\n"
-        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
+        "import psutil, sys; from pathlib import Path; from tests.support import fakes\n"
+        f"psutil.Process().rlimit(psutil.RLIMIT_FSIZE, ({size}, {size}))\n"
         "study = fakes.Study(output=fakes.Output('full'))\n"
         f"fakes.run(study, Path({str(path)!r}), 1, 4)"
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import resource
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
+import psutil
 import pytest
 from typer.testing import CliRunner
 
@@ -60,7 +60,7 @@ def test_a_process_that_may_use_too_little_memory_says_so(tmp_path: Path) -> Non
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        preexec_fn=lambda: psutil.Process().rlimit(psutil.RLIMIT_AS, (limit, limit)),
     )
     assert done.returncode == 2
     assert "error: memory: " in done.stderr
@@ -120,13 +120,14 @@ def test_a_full_disk_ends_in_one_message_and_leaves_no_half_file(words: tuple[st
     command, option, new = words
     path = synthetic.store(tmp_path)
     names, content = sorted(tmp_path.iterdir()), path.read_bytes()
-    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    process = psutil.Process()
+    _, hard = process.rlimit(psutil.RLIMIT_FSIZE)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+            process.rlimit(psutil.RLIMIT_FSIZE, (20_000, hard))
             ended = corruption.call([command, path, option, tmp_path / new, "--quiet"], Path(folder))
         finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+            process.rlimit(psutil.RLIMIT_FSIZE, (hard, hard))
     assert (ended.code, ended.err.splitlines()) == (
         2,
         [

@@ -59,7 +59,7 @@ def check(
         found = compare.difference(path, f"{campaign.name}/{name}.txt", text)
         if found and updating:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+            path.write_text(text, encoding="utf-8", newline="\n")
             return ""
         return found
 

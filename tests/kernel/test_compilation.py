@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numba import float64
 
+from tests.support.environment import environment
 from tests.support.linkages import mechanism_of
 from tolstat.common.cardan import CARDAN, MECHANISMS
 from tolstat.common.mechanism import GENERAL, numbering
@@ -171,3 +172,31 @@ def test_scipy_is_loaded_only_by_code_that_calls_blas():
         "assert 'scipy.linalg' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.parametrize(
+    "internal",
+    [
+        "numba.core.codegen.JITCodeLibrary",
+        "numba.core.compiler_machinery.LoweringPass",
+        "numba.core.runtime.rtsys",
+        "numba.core.typed_passes.AnnotateTypes",
+    ],
+)
+def test_without_an_internal_of_numba_functions_are_compiled_one_by_one(tmp_path, internal):
+    """And kept: the second process compiles nothing. Each says once what it does."""
+    module = internal.rpartition(".")[0]
+    script = (
+        f"import numba, {module}\n"
+        f"del {internal}\n"
+        "from tests.kernel import test_cache, test_compilation\n"
+        "print(test_compilation.top(test_compilation.X), test_cache.compiled())\n"
+    )
+    for expected in (True, False):
+        own, python = environment() | {"NUMBA_CACHE_DIR": str(tmp_path)}, [sys.executable, "-c", script]
+        done = subprocess.run(python, capture_output=True, text=True, check=True, env=own)
+        value, compiled = done.stdout.split()
+        assert float(value) == pytest.approx(TOP, rel=1e-15)
+        assert compiled == str(expected)
+        assert done.stderr.count("\n") == 1
+        assert "kernels are compiled function by function" in done.stderr

@@ -8,7 +8,6 @@ After FOLDER may come the rows of a block, and then patterns of the results to k
 from __future__ import annotations
 
 import json
-import resource
 import sys
 import time
 from collections.abc import Sequence
@@ -43,7 +42,8 @@ def no_histories(*_: object) -> dict[str, HistorySpec]:
 
 def peak_bytes() -> int:
     """Largest memory of this process so far."""
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
 
 
 def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()) -> dict[str, Any]:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from numba.core import config
 
+from tests.support.environment import ROOT, environment
+from tolstat import sampling, study
 from tolstat.common.cardan import CARDAN, MECHANISMS
 from tolstat.common.parameters import mark_of
 from tolstat.common.tables import Fidelity, Options
 from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY
+from tolstat.kernel.simd.lane import WIDTH
 from tolstat.solver import compilation
+from tolstat.solver.simulation import simulate_rows
+from tolstat.store.recorded import perturbed
 
 
 @pytest.fixture
@@ -75,3 +84,48 @@ def test_compilation_is_told_once(calls: list[str], monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(compilation, "missing", lambda *_: [])
     compilation.warm_up()
     assert len(caplog.records) == 1
+
+
+def of_main_job(rows: range) -> tuple[np.ndarray, int]:
+    """Results of joints of the main job, and the number of lanes that they were simulated in."""
+    plan = study.load(ROOT / "studies" / "iso2768_f.toml")
+    errors = np.concatenate(list(sampling.draw_blocks(plan, rows)))
+    return simulate_rows(perturbed(plan, np.array(rows), errors), plan.solver.options()).results, WIDTH
+
+
+IN_ANOTHER_PROCESS = """
+import sys
+CHANGE
+import numpy as np
+from tests.solver.test_compilation import of_main_job
+found, width = of_main_job(range(20))
+np.save(sys.argv[1], found)
+print(width)
+"""
+ABSENT = "import numba.core.codegen; del numba.core.codegen.JITCodeLibrary"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("processor", "change", "width"),
+    [("generic", "", 2), ("", ABSENT, WIDTH)],
+    ids=["registers of 128 bits", "function by function"],
+)
+def test_results_have_the_same_bytes_however_kernels_are_compiled(
+    tmp_path: Path, processor: str, change: str, width: int
+) -> None:
+    """Their arithmetic has no order to choose, and fused operations are written as such: LLVM changes no bit."""
+    own = environment() | {"NUMBA_CACHE_DIR": str(tmp_path)} | ({"NUMBA_CPU_NAME": processor} if processor else {})
+    code, file = IN_ANOTHER_PROCESS.replace("CHANGE", change), tmp_path / "found.npy"
+    done = subprocess.run([sys.executable, "-c", code, file], env=own, stdout=subprocess.PIPE, text=True, check=True)
+    assert int(done.stdout) == width
+    assert np.load(file).tobytes() == of_main_job(range(20))[0].tobytes()
+
+
+@pytest.mark.slow
+def test_threads_do_not_disturb_each_other() -> None:
+    """Their kernels run at the same time."""
+    parts = [range(first, first + 32) for first in range(1, 257, 32)]
+    alone = [of_main_job(rows)[0].tobytes() for rows in parts]
+    with ThreadPoolExecutor(2) as threads:
+        assert [found.tobytes() for found, _ in threads.map(of_main_job, parts)] == alone

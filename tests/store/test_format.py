@@ -248,8 +248,8 @@ def test_files_that_are_not_as_their_metadata_say_are_refused(whole: Path, name:
 
 
 READ_ALL = """
-import pathlib, resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (1 << 32, 1 << 32))
+import pathlib, psutil, sys
+psutil.Process().rlimit(psutil.RLIMIT_AS, (1 << 32, 1 << 32))
 from tests.support.reading import read_all
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION

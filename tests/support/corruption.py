@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import resource
 import shutil
 import signal
 import sys
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import psutil
 from typer.testing import CliRunner
 
 from tests.support.damage import flip
@@ -64,11 +64,11 @@ def _be_command(words: list[str], out: Path, err: Path, folder: Path) -> None:
     code = 99
     os.setsid()
     try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        limit, used = pages * resource.getpagesize() + LIMIT_BYTES, int(time.process_time())
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_CPU, (used + LIMIT_S, used + LIMIT_S))
+        process = psutil.Process()
+        limit, used = process.memory_info().vms + LIMIT_BYTES, int(time.process_time())
+        process.rlimit(psutil.RLIMIT_AS, (limit, limit))
+        process.rlimit(psutil.RLIMIT_CORE, (0, 0))
+        process.rlimit(psutil.RLIMIT_CPU, (used + LIMIT_S, used + LIMIT_S))
         for number, path in ((1, out), (2, err)):
             os.dup2(os.open(path, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), number)
         sys.stdout, sys.stderr = (os.fdopen(k, "w", encoding="utf-8", closefd=False) for k in (1, 2))

@@ -6,22 +6,22 @@ cluster again. A cluster of this machine whose workers do not come back leaves a
 
 from __future__ import annotations
 
-import fcntl
-import os
 import queue
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import InputError, input_error
+from tolstat.common.late import filelock
+from tolstat.kernel.simd.cache_folder import user
 from tolstat.store.metadata import differing, versions
 
 if TYPE_CHECKING:
@@ -38,9 +38,6 @@ FETCH_S = 60.0
 """Time limit for fetching a result, s."""
 LOOPBACK = "127.0.0.1"
 """Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
-
-_ONE_AT_A_TIME = threading.Lock()
-"""Lock: a simulation uses work arrays of the process, which the threads of a worker must not use at the same time."""
 
 
 def map_on_cluster(
@@ -120,11 +117,10 @@ def map_on_cluster(
 
 
 def _process_block(work: Work[Any, Any], expected: Mapping[str, str], block: Any) -> Any:
-    """Process a block in a worker, one block at a time."""
+    """Process a block in a worker."""
     check(expected, _versions(), "a Dask worker")
-    with _ONE_AT_A_TIME:
-        _prepare(work.prepare)
-        return work.function(block)
+    _prepare(work.prepare)
+    return work.function(block)
 
 
 _versions = cache(versions)
@@ -133,8 +129,7 @@ _versions = cache(versions)
 @cache
 def _prepare(prepare: Callable[[], object]) -> None:
     """Prepare this process once; processes of a machine take turns, since they may compile into one cache."""
-    with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with filelock.FileLock(Path(tempfile.gettempdir(), f"tolstat-{user()}.lock")):
         prepare()
 
 

@@ -11,12 +11,11 @@ it does not have.
 
 from __future__ import annotations
 
-import fcntl
 import multiprocessing
 import os
 import pickle
 import signal
-import sys
+import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -40,10 +39,8 @@ MAX_FAILURES = 10
 Nine attempts lead from a block of 256 to a joint, so that one joint never ends a map."""
 READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 """Kinds of messages from a worker, and what stands for one from a worker that has died."""
-SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
-"""Signals that end a campaign. Workers ignore them: their parent decides when to stop."""
-F_SETSIG = 10
-"""Command of Linux's fcntl that says which signal a file sends; the standard library has no name for it."""
+SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"))
+"""Signals of this system that end a campaign. Workers ignore them: their parent decides when to stop."""
 HINT = (
     "hint: if memory is short, use fewer workers: --workers 1; in a Python script, start the campaign under: "
     'if __name__ == "__main__":'
@@ -283,19 +280,23 @@ def _reason(failure: str | Exception) -> str:
 
 @contextmanager
 def signals_blocked() -> Iterator[None]:
-    """Let processes started inside inherit blocked signals, until they ignore them."""
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    """Let processes started inside inherit blocked signals, until they ignore them; Windows cannot block any."""
+    system: Any = signal
+    if not hasattr(system, "pthread_sigmask"):
+        yield
+        return
+    mask = system.pthread_sigmask(system.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        system.pthread_sigmask(system.SIG_SETMASK, mask)
 
 
 def serve(connection: Connection, prepare: Callable[[], object]) -> None:
     """Main loop of a worker: apply functions to blocks until the parent closes the pipe or ends."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    _end_with_parent()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     with suppress(EOFError, OSError):
         connection.send((READY, None))
@@ -317,14 +318,11 @@ def _answer(function: Callable[[Any], Any], block: Any) -> tuple[str, Any]:
 
 
 def _end_with_parent() -> None:
-    """Let the operating system kill this process when its parent ends (Linux); elsewhere it ends after its block.
+    """Wait for the end of the parent, and end this process at once, whatever its other thread does.
 
-    Compiled code blocks Python's threads and signal handlers. The pipe that ends with the parent sends a signal, which
-    needs neither.
+    Kernels release the lock of Python's interpreter, so that this thread runs beside them.
     """
     parent = multiprocessing.parent_process()
-    if parent is None or not sys.platform.startswith("linux"):
-        return
-    fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(parent.sentinel, F_SETSIG, signal.SIGKILL)
-    fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -75,16 +75,16 @@ class Stop:
 
 @contextmanager
 def signals_caught() -> Iterator[Stop]:
-    """Catch SIGINT, SIGTERM and SIGHUP; the previous handlers are restored at the end.
+    """Catch `SIGNALS`; the previous handlers are restored at the end.
 
-    A SIGHUP that is already ignored (nohup) stays ignored. Only the main thread can catch signals; in other threads
+    A hang-up that is already ignored (nohup) stays ignored. Only the main thread can catch signals; in other threads
     the caller has to handle them.
     """
     stop = Stop()
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for number in SIGNALS:
-            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            if number in (signal.SIGINT, signal.SIGTERM) or signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, stop.handle)
     try:
         yield stop

@@ -20,7 +20,6 @@ import errno
 import gc
 import inspect
 import re
-import resource
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from inspect import Parameter, Signature
@@ -33,6 +32,7 @@ from tolstat.cli._library import points, stores, units
 from tolstat.cli._shared import deliver, fail, loaded, opened, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
+from tolstat.common.late import psutil
 from tolstat.display import options
 from tolstat.questions import Question
 
@@ -209,9 +209,10 @@ def _memory(short: str) -> Fault:
 
 
 def _limit_mb() -> int:
-    """Address space that this process may use, MB; 0 if it is not limited."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return 0 if soft == resource.RLIM_INFINITY else soft // 10**6
+    """Address space that this process may use, MB; 0 if it is not limited, or the system knows no such limit."""
+    process = psutil.Process()
+    soft: int = process.rlimit(psutil.RLIMIT_AS)[0] if hasattr(process, "rlimit") else -1
+    return max(0, soft // 10**6)  # infinity is -1
 
 
 READS: dict[str, dict[str, Any]] = {

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Literal
 
 from tolstat.cli._library import np, spectra, starter, studies, text
 from tolstat.cli._shared import echo, say
 from tolstat.common.errors import Fault, gather, raise_all
-from tolstat.common.files import check_target
+from tolstat.common.files import check_target, write_text
+from tolstat.common.shell import quote
 from tolstat.display.options import Opt
 
 RIGHT = 0.5 * math.pi
@@ -110,7 +110,7 @@ def _write_cycle(path: Path, signal: Path, alpha: float | None, exponent: float,
     cycle = spectra.spectrum(signal, exponent, alpha)
     content = spectra.text(cycle, signal, path, base)
     studies.load(path, text=content)  # its faults, before anything is written
-    text.write(content, path)
+    write_text(path, content)
     rows = [("point", "alpha", "speed", "torque", "time", "damage")]
     values = (cycle.alpha, cycle.speed, cycle.torque, cycle.time, cycle.damage)
     for name, alpha, speed, torque, time, damage in zip(cycle.names, *values, strict=True):

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any, Literal
 
 from tolstat.cli import _library as library
@@ -26,6 +25,7 @@ from tolstat.cli._shared import (
 )
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
+from tolstat.common.shell import quote
 from tolstat.display.options import (
     Accepted,
     AsJson,

@@ -1,21 +1,20 @@
 """Processors: their number, threads of libraries on them, and functions evaluated in other processes at the same time.
 
-These processes are forks of this one, which need no start and no copies. Where there is no fork that is safe (outside
-Linux), functions are evaluated here. Results do not depend on that. A fork may read a result file that is open here for
-reading: HDF5 reads at given places (pread), they share no position.
+These processes are forks of this one, which need no start and no copies. Where there is no fork, or none that is safe
+(macOS), functions are evaluated here. Results do not depend on that. A fork may read a result file that is open here
+for reading: HDF5 reads at given places (pread), they share no position.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection
 from numbers import Integral
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from tolstat.common.errors import input_error
 
@@ -78,7 +77,7 @@ def number_of_workers(workers: int | None) -> int:
 
 T = TypeVar("T")
 
-CAN_FORK = sys.platform == "linux"
+CAN_FORK = multiprocessing.get_all_start_methods()[0] != "spawn"  # the default one
 
 
 class Forked(Generic[T]):
@@ -97,7 +96,7 @@ class Forked(Generic[T]):
         self._results: list[T] = []
         self._process = None
         if forks and CAN_FORK:
-            context = multiprocessing.get_context("fork")
+            context: Any = multiprocessing.get_context("fork")
             self._end, other = context.Pipe(duplex=False)
             self._process = context.Process(target=_send, args=(function, other, self._end), daemon=True)
             self._process.start()

@@ -7,6 +7,7 @@ import errno
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -67,13 +68,12 @@ def read_input(path: Path, utf_16: bool = False) -> str:
     UnicodeDecodeError
         When it is not UTF-8 text, see `about_encoding`.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    with open(handle, "rb") as file:
-        status = os.fstat(handle)
-        if stat.S_ISDIR(status.st_mode):
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-        if not stat.S_ISREG(status.st_mode):
-            raise OSError(errno.EINVAL, "is a pipe or a device, not a file", str(path))
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "is a pipe or a device, not a file", str(path))
+    with path.open("rb") as file:
         content = file.read(MAX_INPUT_BYTES + 1)
     if content.startswith(HDF5):
         raise UnicodeDecodeError("utf-8", HDF5, 0, 1, "HDF5")
@@ -154,6 +154,8 @@ def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     ------
     FileExistsError
         When `overwrite` is false and `path` exists, even if it was created in the meantime.
+    InputError
+        When `path` is open in another program, and the system does not replace such files.
     """
     make_parent(path)
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
@@ -161,10 +163,11 @@ def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
         yield temporary
         sync(temporary)
         if overwrite:
-            os.replace(temporary, path)
+            _replace(temporary, path)
         else:
             _rename_new(temporary, path)
-        sync(path.parent)
+        if hasattr(os, "O_DIRECTORY"):  # a system that opens folders
+            sync(path.parent)
     except OSError as error:
         if error.errno is not None and error.filename in (None, str(temporary)):
             error.filename = str(path)  # a full disk gives no name, others the temporary one
@@ -184,6 +187,8 @@ def check_disk_space(path: Path, size: int) -> None:
         When there is not enough space.
     """
     if not hasattr(os, "posix_fallocate"):
+        if shutil.disk_usage(path.parent).free < size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         return
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
@@ -201,6 +206,20 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as `atomic_write` does, in UTF-8, its lines ended alike on all systems."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _replace(source: Path, target: Path) -> None:
+    try:
+        os.replace(source, target)
+    except PermissionError as error:
+        found = f"cannot be replaced: {reason(error)}"
+        raise input_error(target, found, "close it in other programs, and run the same command again") from error
 
 
 def _rename_new(source: Path, target: Path) -> None:

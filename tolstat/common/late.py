@@ -32,7 +32,9 @@ def names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 if TYPE_CHECKING:
+    import filelock as filelock
     import pandas as pandas
+    import psutil as psutil
     import tomlkit as tomlkit
     import tomlkit.exceptions
     import tomlkit.items
@@ -42,6 +44,6 @@ if TYPE_CHECKING:
     from scipy import special as special
     from scipy import stats as stats
 else:
-    pandas, tomlkit = Late("pandas"), Late("tomlkit")
+    filelock, pandas, psutil, tomlkit = map(Late, ("filelock", "pandas", "psutil", "tomlkit"))
     modules = ("integrate", "interpolate", "optimize", "special", "stats")
     integrate, interpolate, optimize, special, stats = (Late(f"scipy.{name}") for name in modules)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,11 @@ def mark_of(mechanism: Mechanism) -> str:
     name = f"numbers_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
     NUMBERS[name] = found
     return name
+
+
+def numbers_of(record: Any) -> dict[str, NDArray[np.int64]]:
+    """Numbers of the mechanism of a Numba type of PARAM; of other records, none."""
+    return next((NUMBERS[name] for name in record.fields if name in NUMBERS), {})
 
 
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:

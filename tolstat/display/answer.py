@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common.errors import TolstatError
+from tolstat.common.files import write_text
 from tolstat.common.late import pandas as pd
 from tolstat.display import drawing, progress, style, text
 from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Sentence
@@ -136,7 +137,8 @@ class Answer:
                 files += style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"))
             elif isinstance(part, Document):
                 path = stem.with_name(f"{stem.name}{part.ending}")
-                files.append(text.write(part.text(path), path))
+                write_text(path, part.text(path))
+                files.append(path)
         return files
 
     def write_picture(self, stem: Path) -> list[Path]:

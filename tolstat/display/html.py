@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 import tolstat
 from tolstat.common.cores import mapped
-from tolstat.common.files import atomic_write
+from tolstat.common.files import write_text
 from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
 from tolstat.display.text import sentence
@@ -108,8 +108,7 @@ def write(page: Page, path: Path, processes: int = 1) -> None:
     text = template.render(
         page=page, version=tolstat.__version__, script=Markup(script), policy=POLICY.format(allowed(script))
     )
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def allowed(script: str) -> str:

@@ -156,7 +156,7 @@ def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg"
     """
     files = [stem.with_name(stem.name + suffix) for suffix in suffixes]
     for path, suffix in zip(files, suffixes, strict=True):
-        with settings(), atomic_write(path) as temporary:
+        with settings(), atomic_write(path) as temporary, temporary.open("wb") as file:
             metadata = {"Date": None} if suffix.lower() == ".svg" else None
-            figure.savefig(temporary, format=suffix.lower().lstrip("."), dpi=150, metadata=metadata)
+            figure.savefig(file, format=suffix.lower().lstrip("."), dpi=150, metadata=metadata)
     return files

@@ -41,13 +41,6 @@ def csv(columns: Mapping[str, Sequence[Any]], stem: Path, what: str) -> Path:
     return path
 
 
-def write(content: str, path: Path) -> Path:
-    """Write a text file; returns its path."""
-    with files.atomic_write(path) as temporary:
-        temporary.write_text(content, encoding="utf-8")
-    return path
-
-
 def csv_rows(columns: Iterable[Sequence[Any]]) -> Iterable[tuple[Any, ...]]:
     """Rows of a CSV file from its columns: NaN becomes an empty cell, text is no formula."""
     return zip(*map(_written, columns), strict=True)

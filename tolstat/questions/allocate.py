@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from tolstat.campaign.work import Work
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import load_of, unit_text
+from tolstat.common.shell import quote
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Budget, Costs, Opt

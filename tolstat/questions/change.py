@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.errors import input_error
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.shell import quote
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Sentence, Table
 from tolstat.display.options import Accepted, Budget, Opt, Settings

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -22,6 +21,7 @@ from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray, Limit, load_of
+from tolstat.common.shell import quote
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt

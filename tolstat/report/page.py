@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 
 import numpy as np
 
 from tolstat.common import loads, notation, strict, units
 from tolstat.common.columns import METHODS
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
+from tolstat.common.shell import quote
 from tolstat.common.tables import SCHEMA_VERSION, VALID
 from tolstat.display import html, progress, rewording, table, text
 from tolstat.display.answer import Asked

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -38,10 +39,14 @@ LOOSER = 2.0
 one joints settle later."""
 
 
-@cache
 def lanes(options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
-    """Work arrays of this process for `width` joints at a time; importing the kernel here spares light commands."""
-    from tolstat.kernel.lanes.batch import make_batch
+    """Work arrays of this thread for `width` joints at a time: kernels of several threads run at the same time."""
+    return _lanes(options, width, mechanism, threading.get_ident())
+
+
+@cache
+def _lanes(options: Options, width: int, mechanism: Mechanism, thread: int) -> Batch:
+    from tolstat.kernel.lanes.batch import make_batch  # here: importing the kernel would make light commands slow
 
     return make_batch(options, width, mechanism)
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import atomic_write, check_disk_space
+from tolstat.store.lock import being_written
 
 BLOCK = 1 << 16
 """Rows read or written at a time, so that no table of a large campaign need be in memory."""
@@ -78,7 +79,7 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
     if not is_at(file, path):
         # another process replaced the file between opening and locking: the open file is not at `path`
         file.close()
-        raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
+        raise being_written(path)
     return file
 
 
@@ -86,11 +87,13 @@ def _not_opened(path: Path, mode: str, error: OSError) -> StoreError:
     if not path.is_file():
         return store_error(path, "does not exist", f"check the path, or create it: tolstat run STUDY --out {path}")
     if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK) or "unable to lock" in str(error):
-        return store_error(path, "is being written by another process", "wait until that process ends, or stop it")
+        return being_written(path)
     if "already open" in str(error) or "don't match" in str(error):
         return store_error(path, "is open in this process in another mode", "close it first")
     if not os.access(path, os.R_OK if mode == "r" else os.R_OK | os.W_OK):
-        return store_error(path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}")
+        return store_error(path, "cannot be opened: no permission", "change its permissions, or those of its folder")
+    if isinstance(error, PermissionError):
+        return store_error(path, "is open in another program", "close it there")
     if not h5py.is_hdf5(path):
         return store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
     return store_error(path, f"{DAMAGED}: {error}", RUN_AGAIN)
@@ -101,19 +104,12 @@ def is_at(file: h5py.File, path: Path) -> bool:
     return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
 
 
-def is_locked(path: Path) -> bool:
-    """Whether a process has locked the file for writing; tested by a shared lock that is released at once."""
-    with open(path, "rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError as error:
-            return error.errno in (errno.EAGAIN, errno.EWOULDBLOCK)
-    return False
-
-
 def copy_open(file: h5py.File, path: Path) -> None:
-    """Copy an open file to `path`, even if its own name has been deleted."""
+    """Copy an open file to `path`, even if its own name has been deleted, which Windows does not allow."""
     file.flush()
+    if not hasattr(os, "pread"):
+        shutil.copyfile(file.filename, path)
+        return
     handle = file.id.get_vfd_handle()
     with open(path, "wb") as copy:
         offset = 0
@@ -122,37 +118,26 @@ def copy_open(file: h5py.File, path: Path) -> None:
             offset += len(chunk)
 
 
-def replace(path: Path, file: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
+def replace(path: Path, file: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> None:
     """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
-
-    No other process can write in between: `file` stays open and locked until the copy is locked and at `path`.
 
     Parameters
     ----------
     path : Path
         The file.
     file : h5py.File
-        The same file, open for writing; closed afterwards.
+        The same file, open for writing; closed before the copy takes its place, which Windows asks for.
     change : callable
         Called with the copy, open for writing.
     growth : int
         Approximate number of bytes by which `change` enlarges the copy.
-
-    Returns
-    -------
-    h5py.File
-        The file now at `path`, open for writing.
     """
     check_disk_space(path, file.id.get_filesize() + growth)
-    with ExitStack() as opened:
-        with atomic_write(path) as temporary:
-            copy_open(file, temporary)
-            with open_hdf5(temporary, "r+") as changed:
-                change(changed)
-            copy = opened.enter_context(open_hdf5(temporary, "r+"))
-        opened.pop_all()
-    file.close()
-    return copy
+    with atomic_write(path) as temporary:
+        copy_open(file, temporary)
+        with open_hdf5(temporary, "r+") as changed:
+            change(changed)
+        file.close()
 
 
 def read_rows(dataset: h5d.DatasetID, first: int, values: NDArray[Any]) -> None:

@@ -26,7 +26,8 @@ from tolstat.common.wording import row_of
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import GROUP, ROWS, CheckedFile, Integrity
-from tolstat.store.hdf5 import RUN_AGAIN, TOGETHER, is_locked, open_hdf5, pick, store_error, told_as_damage
+from tolstat.store.hdf5 import RUN_AGAIN, TOGETHER, open_hdf5, pick, store_error, told_as_damage
+from tolstat.store.lock import is_locked
 from tolstat.study.points import Point, only_one
 
 LOG = logging.getLogger("tolstat.store")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -24,8 +24,9 @@ from tolstat.common.files import atomic_write, check_disk_space, make_parent, re
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import checksums, layout, metadata
 from tolstat.store.checksums import ROWS, blocks_of
-from tolstat.store.hdf5 import copy_open, is_at, put, replace, store_error
+from tolstat.store.hdf5 import copy_open, is_at, open_hdf5, put, replace, store_error
 from tolstat.store.layout import Tables
+from tolstat.store.lock import writing
 from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
 from tolstat.study import Study
@@ -40,6 +41,8 @@ class Writer(Reader):
 
     _written: NDArray[np.bool_]
     """Blocks whose checksums are out of date, at any operating point."""
+    _held: ExitStack
+    """The file's lock."""
 
     @classmethod
     def create(
@@ -103,12 +106,12 @@ class Writer(Reader):
             When it is not a result file of this schema version, is damaged, or is being written by another
             process.
         """
-        store = cls._opened(Path(path), "r+")
-        try:
+        with ExitStack() as held:
+            held.enter_context(writing(Path(path)))
+            store = cls._opened(Path(path), "r+")
+            held.callback(lambda: store._checked.close())
             store._verify()
-        except BaseException:
-            store._checked.close()
-            raise
+            store._held = held.pop_all()
         return store
 
     def _verify(self) -> None:
@@ -136,9 +139,9 @@ class Writer(Reader):
 
     def close(self) -> None:
         """Write the checksums if anything was written, and close the file."""
-        if self.is_open:
-            self.finish()
-        self._checked.close()
+        with self._held:
+            if self.is_open:
+                self.finish()
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         """Write the results of `rows` at the operating point; on return they are on disk and no longer pending.
@@ -256,7 +259,11 @@ class Writer(Reader):
             When there is no room for a second copy of the file.
         """
         with self._told("cannot be replaced", "free disk space for a second copy, " + KEPT):
-            self._checked.use(replace(self.path, self._checked.file, change, growth), self.metadata)
+            try:
+                replace(self.path, self._checked.file, change, growth)
+            finally:
+                if not self._checked.file:
+                    self._checked.use(open_hdf5(self.path, "r+"), self.metadata)
 
     def _begin_writing(self, rows: NDArray[np.intp]) -> None:
         """Tell readers, on the disk, that checksums of results do not hold until `finish`."""

@@ -7,11 +7,11 @@ nothing holds pins along their holes.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from shlex import quote
 from typing import NamedTuple
 
 from tolstat.common.cardan import PARTS
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.shell import quote
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import SPLINE, Joint, Operation, OperationOfLinkage, OperationOfShaft, joints_of, mechanism_of
 from tolstat.joint.ideal import NO_CLOSED_FORM

@@ -11,7 +11,7 @@ from typing import Any
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, input_error, raise_all
-from tolstat.common.files import atomic_write, data_dir
+from tolstat.common.files import data_dir, write_text
 from tolstat.study import cross_sizes, rewriting
 from tolstat.study.schema import KINDS, schema
 
@@ -104,8 +104,7 @@ def _write(path: Path, study: str, joint: str | None) -> list[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for file, text in files.items():
-            with atomic_write(file) as temporary:
-                temporary.write_text(text, encoding="utf-8")
+            write_text(file, text)
     except OSError as error:
         found = f"cannot be written: {error.strerror or error}"
         raise input_error(path, found, "give a folder that is writable") from error

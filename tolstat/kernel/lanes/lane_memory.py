@@ -12,8 +12,7 @@ from numba.core.datamodel import models
 from numba.extending import intrinsic, lower_getattr, overload, register_model
 
 from tolstat.common.cardan import CARDAN
-from tolstat.common.parameters import numbers
-from tolstat.kernel.simd.absent import numbers_of
+from tolstat.common.parameters import numbers, numbers_of
 from tolstat.kernel.simd.lane import LANE, SINGLE, WIDTH
 
 ALIGNMENT = 8 * WIDTH

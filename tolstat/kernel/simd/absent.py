@@ -15,15 +15,10 @@ from numba.core import ir, types
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import get_definition, guard
 
-from tolstat.common.parameters import NUMBERS
+from tolstat.common.parameters import numbers_of
 
 COMPARISONS = (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge)
 EVALUATED = (*COMPARISONS, operator.add, operator.sub, operator.mul)
-
-
-def numbers_of(record):
-    """Numbers of the mechanism of a Numba type of PARAM; of other records, none."""
-    return next((NUMBERS[name] for name in record.fields if name in NUMBERS), {})
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

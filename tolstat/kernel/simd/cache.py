@@ -14,14 +14,28 @@ import pickle
 import uuid
 from pathlib import Path
 
-from numba.core.caching import FunctionCache
+from numba.core import config
+from numba.core.caching import FunctionCache, UserProvidedCacheLocator
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from tolstat.kernel.simd.cache_folder import SUFFIX, tell
+from tolstat.kernel.simd.cache_folder import KERNEL, SUFFIX, tell
 
 DIGEST = hashlib.sha256
 SIZE = DIGEST().digest_size
+
+
+class Locator(UserProvidedCacheLocator):
+    """Cache locator that ignores the folder of the sources: one compilation serves every environment."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file):
+        """Subfolder of the cache directory; the hash in the directory's name already identifies the sources."""
+        of_kernel = Path(py_file).is_relative_to(KERNEL)
+        return KERNEL.name if of_kernel else str(super().get_suitable_cache_subpath(py_file))
+
+    def ensure_cache_path(self):
+        """Require nothing: a folder that can only be read will do."""
 
 
 class CheckedFiles:
@@ -79,3 +93,13 @@ class CheckedCache(FunctionCache):
         """
         rtsys.initialize(target_context)
         return self._load_overload(sig, target_context)
+
+
+def keep(kernel):
+    """Keep the code of a kernel that Python calls in the directory that Numba is configured for."""
+    before = config.CACHE_LOCATOR_CLASSES
+    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{Locator.__name__}"  # Numba reads it when a cache is made
+    try:
+        kernel._cache = CheckedCache(kernel.py_func)
+    finally:
+        config.CACHE_LOCATOR_CLASSES = before

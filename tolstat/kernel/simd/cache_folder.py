@@ -16,6 +16,8 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
+import platformdirs
+
 KERNEL = Path(__file__).parent.parent
 TABLES = ("load_kinds.py", "mechanism.py", "parameters.py", "tables.py")
 """Files of ``common/`` whose constants are part of compiled code; sizes of records are part of its signature."""
@@ -52,10 +54,15 @@ def is_trusted(path: Path) -> bool:
 
 
 def root() -> Path:
-    """Folder of the folders of all versions: ``NUMBA_CACHE_DIR`` if set, else one in the user's cache."""
+    """Folder of the folders of all versions: ``NUMBA_CACHE_DIR`` if set, else the system's for caches of the user."""
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"]).absolute()
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tolstat"
+    return platformdirs.user_cache_path("tolstat", appauthor=False)
+
+
+def user() -> int | str:
+    """Number of the user, or the name where users have no numbers."""
+    return os.getuid() if hasattr(os, "getuid") else getpass.getuser()
 
 
 def cache_directory() -> Path:
@@ -76,7 +83,7 @@ def cache_directory() -> Path:
 
 
 def _temporary_directory() -> Path:
-    path = Path(tempfile.gettempdir()) / f"tolstat-{getpass.getuser()}-{PREFIX}{source_hash()}"
+    path = Path(tempfile.gettempdir()) / f"tolstat-{user()}-{PREFIX}{source_hash()}"
     with contextlib.suppress(OSError):
         path.mkdir(mode=0o700, exist_ok=True)
     return path if is_trusted(path) else Path(tempfile.mkdtemp(prefix=f"tolstat-{PREFIX}"))

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core import config
-from numba.core.caching import UserProvidedCacheLocator
+from numba.core.registry import CPUDispatcher
 
-import tolstat.kernel.simd.without_blas  # noqa: F401
-from tolstat.kernel.simd.cache import CheckedCache
-from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, KERNEL
-from tolstat.kernel.simd.unit import Kernel
+from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, tell
+
+try:
+    import tolstat.kernel.simd.without_blas  # noqa: F401
+    from tolstat.kernel.simd.cache import keep
+    from tolstat.kernel.simd.unit import Kernel
+except (ImportError, AttributeError) as error:  # a Numba with other internals
+    Kernel, keep = CPUDispatcher, CPUDispatcher.enable_caching
+    if multiprocessing.parent_process() is None:  # workers need not say it again
+        slower = "kernels are compiled function by function, which takes longer; results are the same"
+        tell(f"Numba {numba.__version__} is not one that this version was written for ({error}): {slower}")
 
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 """No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""
-
-
-class Locator(UserProvidedCacheLocator):
-    """Cache locator that ignores the folder of the sources: one compilation serves every environment."""
-
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Subfolder of the cache directory; the hash in the directory's name already identifies the sources."""
-        of_kernel = Path(py_file).is_relative_to(KERNEL)
-        return KERNEL.name if of_kernel else str(super().get_suitable_cache_subpath(py_file))
-
-    def ensure_cache_path(self) -> None:
-        """Require nothing: a folder that can only be read will do."""
+OPTIONS |= {"nogil": True}  # so that a worker notices the end of its parent while a kernel runs
 
 
 def njit(function: Callable[..., Any]) -> Any:
     """Compile `function` with the kernel's options; code of a kernel that Python calls is cached on disk."""
     kernel = njit_inner(function)
     if kernel is not function:
-        before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-        # Numba reads both when a cache is made; functions of other packages keep their own directory
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(CACHE_DIRECTORY), f"{__name__}.{Locator.__name__}"
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(CACHE_DIRECTORY)  # read when a cache is made; functions of other packages keep their own
         try:
-            kernel._cache = CheckedCache(function)
+            keep(kernel)
         finally:
-            config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+            config.CACHE_DIR = before
     return kernel
 
 

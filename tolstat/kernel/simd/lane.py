@@ -12,13 +12,15 @@ import operator
 import numpy as np
 from llvmlite import ir
 from llvmlite.binding import get_host_cpu_features
-from numba.core import cgutils, types
+from numba.core import cgutils, config, types
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, overload, register_model
 
-WIDTH = 8 if get_host_cpu_features().get("avx512f") else 4
-"""Number of lanes: doubles in a register of 512 or 256 bits. No result depends on it."""
+FEATURES = (config.CPU_FEATURES if config.CPU_FEATURES is not None else get_host_cpu_features().flatten()).split(",")
+"""What the processor that Numba compiles for can do; ``NUMBA_CPU_NAME`` and ``NUMBA_CPU_FEATURES`` name another one."""
+WIDTH = 8 if "+avx512f" in FEATURES else 4 if "+avx" in FEATURES else 2
+"""Number of lanes: doubles in a register of 512, 256 or 128 bits (SSE2, NEON). No result depends on it."""
 
 DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 SINGLES = ir.VectorType(ir.FloatType(), WIDTH)

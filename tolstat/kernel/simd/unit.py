@@ -4,8 +4,8 @@ Numba optimises and emits each function separately, with a copy of all its calle
 calls. Here a kernel that is called by kernels stays intermediate code. The kernel that Python calls links each of its
 direct and indirect callees once, and is optimised, emitted and cached together with them.
 
-This module depends on internals of the Numba that ``pyproject.toml`` names; ``tests/kernel/test_compilation.py`` fails
-where they change.
+This module depends on Numba's internals. Where it cannot be imported, `jit` compiles function by function;
+``tests/kernel/test_compilation.py`` fails where they change.
 """
 
 from llvmlite.binding import Linkage
@@ -18,6 +18,9 @@ from numba.core.types import Dispatcher, unliteral
 from numba.core.untyped_passes import InlineClosureLikes, RewriteSemanticConstants
 
 from tolstat.kernel.simd.absent import DecideConditions
+
+for _method in ("_raise_if_finalized", "_get_module_for_linking", "_optimize_final_module", "_finalize_final_module"):
+    getattr(JITCodeLibrary, _method)  # an AttributeError now, not while a kernel is compiled
 
 
 class Unit(JITCodeLibrary):

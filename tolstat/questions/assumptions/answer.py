@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, NotApplicable, gather, raise_all
+from tolstat.common.shell import quote
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Sentence, Table
 from tolstat.display.options import Accepted, Opt

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from tolstat.common.channels import histories_of
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.shell import quote
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.shell import quote
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table, has

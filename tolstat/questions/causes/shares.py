@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
-from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.shell import quote
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
 from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, unusable, with_ends

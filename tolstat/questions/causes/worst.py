@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from shlex import quote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from tolstat.analysis.sensitivity import FEWEST
 from tolstat.common.columns import result_columns
 from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import FloatArray, load_of, loads_of
+from tolstat.common.shell import quote
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, VALID, Status
 from tolstat.display.answer import Answer, Asked, Column, Part, Row, Rows, Sentence, Table

@@ -262,7 +262,7 @@ class Writer(Reader):
             try:
                 replace(self.path, self._checked.file, change, growth)
             finally:
-                if not self._checked.file:
+                if not self._checked.is_open:
                     self._checked.use(open_hdf5(self.path, "r+"), self.metadata)
 
     def _begin_writing(self, rows: NDArray[np.intp]) -> None:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.campaign import pool
-from tolstat.campaign.block import Block, Timed, loads_of, results_of, simulate_block, spread
-from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
+from tolstat.campaign.block import Block, loads_of, simulate_block, spread
+from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing
 from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import number_of_workers
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
 STEP = 0.1
 """Step of the finite differences that OpenTURNS takes for derivatives, in standard deviations of the input."""
 
-LEAST_SHARED = 256
-"""Number of joints from which on worker processes are started: fewer take less time than the start, on the main job."""
 VARIANT = "variant"
 """Column of a study with several joints: which of them, by its number."""
 
@@ -47,8 +44,7 @@ class Function:
     no valid one, and `status` says why. A DataFrame, mapping or structured array gives errors by name: all of `names`,
     and any others of `units`; an array, (n, d), gives those of `names` by position. Errors are deviations, as
     `tolstat.draw` and exports have them, those of ``operation.*`` from the operating point. Loads equal what a campaign
-    of the study stores for the same errors, to the last bit. Inside ``with f:`` worker processes stay from one call to
-    the next.
+    of the study stores for the same errors, to the last bit.
 
     Attributes
     ----------
@@ -91,14 +87,6 @@ class Function:
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.turning: dict[str, Array] = {}
         self.simulated = 0
-        self._inside = ExitStack()
-
-    def __enter__(self) -> Self:
-        self._inside.enter_context(pool.kept_workers())
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._inside.close()
 
     def __repr__(self) -> str:
         return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"
@@ -258,8 +246,7 @@ class Function:
         study, distinct = self.study, list(dict.fromkeys(self.options))
         option = np.array([distinct.index(own) for own in self.options])[variant]
         loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
-        is_alone = n < LEAST_SHARED or workers == 1
-        size = MAX_BLOCK if is_alone else min(MAX_BLOCK, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
+        size = MAX_BLOCK if workers == 1 else min(MAX_BLOCK, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
         parts = []
         for number in range(len(distinct)):
             here = np.flatnonzero(option == number)
@@ -267,21 +254,17 @@ class Function:
         of = tables(study.mechanism)
         shapes = {"equivalent_load": of.RESULT, "alpha": of.PARAM, "omega": of.PARAM}
         self.turning = {name: np.full((n, *table[name].shape), np.nan) for name, table in shapes.items()}
-        blocks = (
-            Block("", slots, parameters_of(study, variant[slots], errors[slots]), own, study.mechanism)
-            for slots, own in parts
-        )
-        finished: Generator[tuple[Block, Timed | pool.Lost], None, None]
-        if is_alone:
-            finished = ((block, simulate_block(simulate_rows, "none", 0, {}, block)) for block in blocks)
-        else:
-            some = spread(n, SOME)
-            for own in distinct:  # once, before the processes start
-                compile_missing(study.mechanism, own, parameters_of(study, variant[some], errors[some]))
-            finished = pool.map_blocks(work_beside(study.mechanism, *distinct), blocks, workers)
-        with closing(finished):
-            for block, result in finished:
-                table = results_of(block, result)
+        some = spread(n, SOME)
+        for own in distinct:  # once, before the threads start
+            compile_missing(study.mechanism, own, parameters_of(study, variant[some], errors[some]))
+
+        def simulated(part: tuple[NDArray[np.intp], Options]) -> tuple[Block, NDArray[np.void]]:
+            slots, own = part
+            block = Block("", slots, parameters_of(study, variant[slots], errors[slots]), own, study.mechanism)
+            return block, simulate_block(simulate_rows, "none", 0, {}, block).simulation.results
+
+        with ThreadPoolExecutor(workers) as threads:
+            for block, table in threads.map(simulated, parts):
                 self.status[block.slots] = table["status"]
                 for name, values in self.turning.items():
                     values[block.slots] = (table if name == "equivalent_load" else block.params)[name]
@@ -304,7 +287,7 @@ def function(
     point : str
         Operating point, of a study with several.
     workers : int, optional
-        Number of processes for `LEAST_SHARED` joints or more; by default one per core. Affects no result.
+        Number of threads; by default one per core. Affects no result.
 
     Returns
     -------

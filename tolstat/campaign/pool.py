@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import traceback
 from collections import deque
@@ -41,10 +42,10 @@ READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 """Kinds of messages from a worker, and what stands for one from a worker that has died."""
 SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"))
 """Signals of this system that end a campaign. Workers ignore them: their parent decides when to stop."""
-HINT = (
-    "hint: if memory is short, use fewer workers: --workers 1; in a Python script, start the campaign under: "
-    'if __name__ == "__main__":'
-)
+HINT = "hint: if memory is short, use fewer workers: --workers 1"
+UNGUARDED = 'a worker runs the script once more\n  hint: start the campaign under: if __name__ == "__main__":'
+SCRIPT = 113
+"""Exit code of a worker that began the script of its user anew."""
 
 
 class WorkerDied(TolstatError):
@@ -80,6 +81,12 @@ class Work(Generic[BlockT, ResultT]):
     prepare: Callable[[], object] = _no_preparation
 
 
+def end_second_script() -> None:
+    """End this process if it is a worker that runs the script of its user, which begins a campaign, once more."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        sys.exit(SCRIPT)
+
+
 def map_blocks(
     work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = lambda: False
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
@@ -111,6 +118,7 @@ def map_blocks(
     Exception
         The function's own, when it was the last of these failures and no block has been finished.
     """
+    end_second_script()
     running: _Map[BlockT, ResultT] = _Map(work, iter(blocks), workers)
     try:
         yield from running.run(stop)
@@ -176,6 +184,8 @@ class _Worker(Generic[BlockT]):
         except (EOFError, OSError):
             self.process.join(1.0)
             code = self.process.exitcode or 0
+            if code == SCRIPT and not self.ready:
+                raise WorkerDied(UNGUARDED) from None
             return DIED, f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         return message
 

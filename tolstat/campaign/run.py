@@ -18,7 +18,7 @@ from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.extend import extend as with_more
-from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
+from tolstat.campaign.pool import SIGNALS, WorkerDied, end_second_script, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
@@ -180,6 +180,7 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
+    end_second_script()
     study = load(study)
     if progress is True:
         with display(tell) as shown:

@@ -29,7 +29,7 @@ def process(folder: Path, *words: str) -> subprocess.Popen[str]:
     """Start a command in a folder."""
     paths = os.pathsep.join([str(ROOT / "tests" / "support" / "windows"), str(ROOT)])
     own = environment() | {"PYTHONPATH": paths, "PYTHONIOENCODING": "cp1252"}
-    python = [sys.executable, "-m", "tolstat", *words]
+    python = [sys.executable, *([] if "dask" in words else ["-W", "error"]), "-m", "tolstat", *words]
     pipe = subprocess.PIPE
     return subprocess.Popen(python, env=own, cwd=folder, stdout=pipe, stderr=pipe, encoding="cp1252")
 

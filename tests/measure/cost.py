@@ -36,6 +36,7 @@ from studies.precision.runs import TRUTH, Job, OtherJob, OwnJob, TruthJob
 from tests.measure import kernel_parts
 from tests.measure.commands import say
 from tests.support.kernel_states import Sample, sample
+from tolstat.common.memory import peak_bytes
 from tolstat.common.tables import Fidelity, Method, Options, Start, Status
 from tolstat.display.text import align
 from tolstat.solver import compilation, simulation
@@ -159,10 +160,7 @@ def _cpu_rate(done: list[Stint]) -> float:
 def _simulate(options: Options, block: NDArray[np.void]) -> Stint:
     begin, cpu = time.monotonic(), time.process_time()
     simulation.simulate_rows(block, options)
-    # of Linux; getrusage would give the memory of the process that started this one
-    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
-    mb = next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1.024e-3
-    return Stint(os.getpid(), len(block), begin, time.monotonic(), time.process_time() - cpu, mb)
+    return Stint(os.getpid(), len(block), begin, time.monotonic(), time.process_time() - cpu, peak_bytes() * 1e-6)
 
 
 def startup(study: Path, cold: bool, repeats: int) -> Table:

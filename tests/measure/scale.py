@@ -23,6 +23,7 @@ from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
 from tolstat.common.fields import HistorySpec
+from tolstat.common.memory import peak_bytes
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile
 
@@ -38,12 +39,6 @@ def simulate(params: np.ndarray, options: Options, **rest: object) -> Simulation
 def no_histories(*_: object) -> dict[str, HistorySpec]:
     """Keep no histories."""
     return {}
-
-
-def peak_bytes() -> int:
-    """Largest memory of this process so far."""
-    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
 
 
 def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()) -> dict[str, Any]:

@@ -20,9 +20,9 @@ from tolstat.campaign.chosen import few
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import number_of_workers
 from tolstat.common.errors import input_error
-from tolstat.common.late import psutil
 from tolstat.common.loads import load_of, split
 from tolstat.common.mechanism import Mechanism
+from tolstat.common.memory import peak_bytes
 from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
@@ -150,7 +150,7 @@ class Plan:
         this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``.
         Joints and check are timed in the pilot; start and report are scaled by the speed of this machine, and rough.
     process_bytes : int
-        Memory of this process; the campaign needs as much for each worker and for its parent process.
+        Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
         Size of the result file, histories included.
     widths : dict of float to float
@@ -282,7 +282,7 @@ def plan(
         seconds_per_joint=each,
         workers=workers,
         stages=stages,
-        process_bytes=psutil.Process().memory_info().rss,
+        process_bytes=peak_bytes(),
         file_bytes=layout.size_of(document, 2 * few(study.rows)),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],

@@ -32,7 +32,7 @@ from tolstat.cli._library import points, stores, units
 from tolstat.cli._shared import deliver, fail, loaded, opened, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
-from tolstat.common.late import psutil
+from tolstat.common.memory import limit_bytes
 from tolstat.display import options
 from tolstat.questions import Question
 
@@ -185,14 +185,14 @@ def check_memory() -> None:
     InputError
         When a process may use less than `LIBRARIES_MB`.
     """
-    if 0 < _limit_mb() < LIBRARIES_MB:
+    if 0 < limit_bytes() < LIBRARIES_MB * 10**6:
         raise InputError([_memory("libraries cannot be loaded")])
 
 
 def shortage(error: MemoryError | OSError | ImportError) -> Fault | None:
     """Describe an error that another machine, or another folder, would not have had; None for any other error."""
     unloaded = isinstance(error, ImportError) or (isinstance(error, OSError) and error.errno is None)
-    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM or (unloaded and _limit_mb()):
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM or (unloaded and limit_bytes()):
         return _memory("libraries cannot be loaded" if unloaded else str(error) or "no more could be allocated")
     if isinstance(error, OSError) and error.errno in DISK:
         remedy = "check that the folder is writable and the disk has space"
@@ -201,18 +201,12 @@ def shortage(error: MemoryError | OSError | ImportError) -> Fault | None:
 
 
 def _memory(short: str) -> Fault:
-    limit, remedy = _limit_mb(), "use fewer workers (--workers 1), keep fewer results ([output]), or end other programs"
+    limit = limit_bytes() // 10**6
+    remedy = "use fewer workers (--workers 1), keep fewer results ([output]), or end other programs"
     if not limit:
         return Fault("memory", short, remedy)
     allowed = f"a process may use {limit} MB (ulimit -v) and needs {LIBRARIES_MB} MB before any joints"
     return Fault("memory", f"{short}; {allowed}", f"{remedy}, or raise ulimit -v")
-
-
-def _limit_mb() -> int:
-    """Address space that this process may use, MB; 0 if it is not limited, or the system knows no such limit."""
-    process = psutil.Process()
-    soft: int = process.rlimit(psutil.RLIMIT_AS)[0] if hasattr(process, "rlimit") else -1
-    return max(0, soft // 10**6)  # infinity is -1
 
 
 READS: dict[str, dict[str, Any]] = {

@@ -9,6 +9,7 @@ from tests.support.laminae import Needles
 from tolstat import joint as joints
 from tolstat.analysis.rating_life import basic_life, line_pressure, turns_per_revolution
 from tolstat.common.cardan import CARDAN
+from tolstat.common.parameters import LAMINAE
 from tolstat.joint import Operation
 from tolstat.joint.laminae import relief
 from tolstat.kernel.revolution.laminae import lamina_load
@@ -32,7 +33,7 @@ def made(**keys):
 def load(par, force, end=0.0, turn=0.0, clearance=0.0, start=2e-5):
     """Equivalent load, N, and line load, N/mm; lengths in mm."""
     ends = (start, 1e-3 * end * np.cos(turn), 1e-3 * end * np.sin(turn))
-    equivalent, line = lamina_load(force, ends, 1e-3 * clearance, 0, par)
+    equivalent, line, _ = lamina_load(force, ends, 0.0, 1e-3 * clearance, 0, par, np.empty((5, LAMINAE)))
     return equivalent, 1e-3 * line
 
 

@@ -67,7 +67,7 @@ def line_pressure(line_load: ArrayLike, needle: ArrayLike, pin: ArrayLike) -> Fl
     Examples
     --------
     >>> round(float(line_pressure(100e3, 4e-3, 38e-3)) / 1e6)  # MPa
-    1417
+    1411
     """
     curvature = 2.0 / np.asarray(needle, float) + 2.0 / np.asarray(pin, float)
     return np.asarray(np.sqrt(np.asarray(line_load, float) * STEEL / (2.0 * np.pi) * curvature))

@@ -17,14 +17,16 @@ MAX_STATIONS = 16
 MAX_ORDERS = 32
 """Maximum number of different orders of speed and torque: 16 of each."""
 
-LAMINAE, TERMS = 30, 7
+LAMINAE, TERMS = 30, 5
 """Laminae of a needle, the smallest number that ISO/TS 16281 admits; coefficients of a polynomial of `needle_fit`."""
 PLACE, RELIEF, EDGES = range(3)
-"""Columns of `lamina`."""
+"""Rows of `lamina`."""
 OF_FORCE, OF_DAMAGE, OF_POWER = range(3)
 """Rows of `needle_fit`."""
 ACROSS_NEEDLES = 1e-5
 """Unit of an approach in the fit of its power, m."""
+IN_LINE, LEAST_DAMAGE = 40, -80.0
+"""Number and first of the natural logarithms of damage of `in_line`, in steps of 1."""
 
 
 @cache
@@ -126,9 +128,10 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "lamina",
             "1, m, 1",
             "laminae of a needle: place from -1 to 1, approach that the profile takes off, weight in damage",
-            shape=(kinds, LAMINAE, 3),
+            shape=(kinds, 3, LAMINAE),
         ),
         Field("needle_fit", "1", "polynomials of force, damage and power of an approach", shape=(kinds, 3, TERMS)),
+        Field("in_line", "1", "log of the force in line and without clearance, by damage", shape=(kinds, IN_LINE)),
         Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
         Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
         Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),

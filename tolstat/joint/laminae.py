@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.common.parameters import ACROSS_NEEDLES, LAMINAE, TERMS
+from tolstat.common.parameters import ACROSS_NEEDLES, IN_LINE, LAMINAE, LEAST_DAMAGE, TERMS
 from tolstat.joint.bearing import DIAMETERS, LINE_CONTACT, Bearing, loaded
 from tolstat.joint.material import Array
 
@@ -58,25 +58,51 @@ def rings(gamma: float) -> tuple[float, float]:
     return inner / (0.83 * 0.378), outer / (0.83 * 0.364)
 
 
+@cache
 def parameters(bearing: Bearing | None, contact: float) -> dict[str, Any]:
     """Fields of PARAM on the laminae of the needles of a bearing; zeros without its diameters.
 
     `contact`: length of the contact, m, that of the needles where the bearing gives none.
     """
     if bearing is None or bearing.lacking(DIAMETERS):
-        return dict.fromkeys(("needle_k", "needle_half", "needles", "lamina", "needle_fit"), 0.0)
+        return dict.fromkeys(("needle_k", "needles", "needle_half", "lamina", "needle_fit", "in_line"), 0.0)
     length = bearing.needle_length or contact
-    lamina = np.column_stack([places(), relief(bearing, length, places()), stress_riser() ** OF_RINGS])
-    stiffness = LINE_CONTACT * 1e3 ** (10.0 / 9.0) * (1e3 * length) ** (8.0 / 9.0)
     Q_ci, Q_ce = rings(bearing.needle_diameter / bearing.pitch_diameter)
-    fit = _fits((Q_ci / Q_ce) ** OF_RINGS)
+    outer = (Q_ci / Q_ce) ** OF_RINGS
     return {
-        "needle_k": stiffness,
-        "needle_half": 0.5 * length,
+        "needle_k": LINE_CONTACT * 1e3 ** (10.0 / 9.0) * (1e3 * length) ** (8.0 / 9.0),
         "needles": bearing.needles,
-        "lamina": lamina,
-        "needle_fit": fit,
+        "needle_half": 0.5 * length,
+        "lamina": (places(), relief(bearing, length, places()), stress_riser() ** OF_RINGS),
+        "needle_fit": _fits(outer),
+        "in_line": _in_line(bearing, length, outer),
     }
+
+
+def _in_line(bearing: Bearing, length: float, outer: float) -> Array:
+    """Log of the force of a bearing in line and without clearance at equidistant logs of damage, (IN_LINE,)."""
+    half = LAMINAE // 2  # the other half is its mirror image
+    lost = relief(bearing, length, places()[:half])
+    r = np.geomspace(1e-9, 1e-2, 100)[:, None] + lost.min()
+    delta = np.maximum(r - lost, 1e-300)
+    share = (delta / r).ravel()
+    force = (delta.ravel() ** (10.0 / 9.0) * loaded(share, _along)).reshape(delta.shape).mean(axis=1)
+    damage = (delta.ravel() ** 5 * _damage(share, outer)).reshape(delta.shape) @ (
+        2.0 * stress_riser()[:half] ** OF_RINGS
+    )
+    wanted = LEAST_DAMAGE + np.arange(IN_LINE)
+    k = LINE_CONTACT * 1e3 ** (10.0 / 9.0) * (1e3 * length) ** (8.0 / 9.0) * bearing.needles
+    return np.asarray(np.interp(wanted, np.log(damage), np.log(k * force)))
+
+
+def _along(x: Array, cosine: Array) -> Array:
+    return np.asarray(x ** (10.0 / 9.0) * cosine)
+
+
+def _damage(share: Array, outer: float) -> Array:
+    """Damage of both rings, in units of that of a lamina's load: inner 4 in the mean, outer 9/2, by weight `outer`."""
+    inner = loaded(share, lambda x, _: x ** (40.0 / 9.0)) ** (9.0 / 8.0)
+    return np.asarray(inner + outer * loaded(share, lambda x, _: x**5))
 
 
 @cache
@@ -84,12 +110,10 @@ def _fits(outer: float) -> Array:
     """Coefficients of force, damage and power of the approach, shape (3, TERMS); `outer`: weight of the outer ring."""
     v = np.linspace(LEAST_SHARE**0.5, 1.0, 400)
     u, t = v**2, np.linspace(0.45, 1.3, 400)
-    inner = loaded(u, lambda x, _: x ** (40.0 / 9.0)) ** (9.0 / 8.0)
-    damage = inner + outer * loaded(u, lambda x, _: x**5)
     return np.array(
         [
-            _fit(u, loaded(u, lambda x, cosine: x ** (10.0 / 9.0) * cosine) / v, 5),
-            _fit(v, damage / v, TERMS),
+            _fit(u, loaded(u, _along) / v, 5),
+            _fit(v, _damage(u, outer) / v, TERMS),
             _fit(t, t ** (8.0 / 9.0) * ACROSS_NEEDLES ** (1.0 / 9.0), 5),
         ]
     )

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from tolstat.common.load_kinds import CONTACTS, RESULTANT
+from tolstat.common.parameters import LAMINAE
 from tolstat.common.tables import LIFE_EXPONENT
 from tolstat.kernel.mechanics.cardan import PINS_OF_JOINT, travel
 from tolstat.kernel.mechanics.loads import CONTACT_FORCES, FAR, FAR_BALLS, FAR_ROLLERS, NEAR, NEAR_BALLS, NEAR_ROLLERS
@@ -14,7 +15,7 @@ from tolstat.kernel.revolution.laminae import lamina_load
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import pick
 
-STRIDE = 4
+STRIDE = 12
 """Samples of the grid from one to the next at which needles under tilt are looked at: equivalent loads vary slowly."""
 TO_OUTER, TO_BOTH, TO_INNER = range(3)
 """Products of the displacements of a pin's end stations in ``ends`` of a sample: outer, both, inner; m^2."""
@@ -53,6 +54,7 @@ def tilt_of(pin, ends, par):
 def write_equivalent_loads(par, samples, out):
     """Write equivalent load, largest tilt and largest line load of each pin's bearing to a row of KERNEL_RESULT."""
     n, pins = samples.size, out.equivalent_load.shape[0]
+    more, work = np.zeros(pins), np.empty((5, LAMINAE))
     for first in range(0, pins, PINS_OF_JOINT):
         whole_output = whole_input = 0.0
         last, known = min(first + PINS_OF_JOINT, pins), par.needle_k[par.pair_kind[first]] > 0
@@ -70,7 +72,8 @@ def write_equivalent_loads(par, samples, out):
                     if load > 0:
                         out.tilt[pin] = max(out.tilt[pin], tilt)
                     if known:
-                        load, line = lamina_load(load, ends, par.clearance[pin], par.pair_kind[pin], par)
+                        kind, c = par.pair_kind[pin], par.clearance[pin]
+                        load, line, more[pin] = lamina_load(load, ends, more[pin], c, kind, par, work)
                         out.line_load[pin] = max(out.line_load[pin], line)
                 out.equivalent_load[pin] += (at_output if pin < first + 2 else at_input) * load**LIFE_EXPONENT
         for pin in range(first, last):

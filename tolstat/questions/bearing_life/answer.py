@@ -56,17 +56,18 @@ LIVES = (
 """Columns of the table ``lives`` after the bearing, arranged by place."""
 
 
-def _last(name: str, unit: str) -> shares.Cell:
-    return lambda row: text.value(row[rating.SHARES[-1]][name], unit)
+def _last(name: str, unit: str, size: float = 1.0) -> shares.Cell:
+    """Make a cell of the row of the largest share, by place; `size` of `unit` in SI."""
+    return lambda row: text.value(row[rating.SHARES[-1]][name] / size, unit)
 
 
 BEARINGS = (
     Column("P nominal", _last("nominal_load", "N"), rank=1),
     Column("P", _last("load", "N")),
-    Column("tilt", _last("tilt", "rad")),
+    Column("tilt", _last("tilt", "mrad", 1e-3)),
     Column("life", lambda row: _hours(row[rating.SHARES[-1]]["life"])),
     Column("C0/P0", _last("safety", "1")),
-    Column("pressure", _last("pressure", "Pa")),
+    Column("pressure", _last("pressure", "MPa", 1e6)),
 )
 """Columns of the table ``bearings`` after the bearing, arranged by place: those of the largest share."""
 BELOW = (
@@ -135,7 +136,7 @@ def bearing_life(view: View) -> Answer:
     each = rating.bearing_rows(lives)
     units = {f"{which}{name}": unit for name, unit in OF_BEARING.items() for which in ("", "nominal_")}
     most = f"{100.0 * rating.SHARES[-1]:g} % of the joints"
-    title = f"What {most} stay below in each bearing; lives and C0/P0 that they reach"
+    title = f"Bearing by bearing, in {most}: P, tilt and pressure at most, life and C0/P0 at least"
     parts.append(Table("bearings", title, (bearing, *BEARINGS), each, units, by_share(each, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"

@@ -163,6 +163,12 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "unbalance of a body along x and y of its frame",
             shape=(len(mechanism.unbalanced), 2),
         ),
+        Field(
+            "of_root",
+            "1/m^3",
+            "stress at the root of a pin by bending and by torsional moment",
+            shape=(len(mechanism.roots), 2),
+        ),
         Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)

@@ -28,7 +28,7 @@ GIVEN_BY = dict(
         PARTS,
         (
             *("thrust", "friction.mu", "shaft.input", "shaft.output"),
-            *("shaft.unbalance", "shaft.lateral", "shaft.spline"),
+            *("shaft.unbalance", "shaft.lateral", "shaft.spline", "pin.root"),
         ),
         strict=True,
     )

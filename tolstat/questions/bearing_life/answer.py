@@ -67,7 +67,7 @@ BEARINGS = (
     Column("tilt", _last("tilt", "mrad", 1e-3)),
     Column("life", lambda row: _hours(row[rating.SHARES[-1]]["life"])),
     Column("C0/P0", _last("safety", "1")),
-    Column("pressure", _last("pressure", "MPa", 1e6)),
+    Column("pressure", _last("pressure", "Pa")),
 )
 """Columns of the table ``bearings`` after the bearing, arranged by place: those of the largest share."""
 BELOW = (

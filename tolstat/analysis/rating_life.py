@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT
 
@@ -121,6 +122,31 @@ def system_life(lives: ArrayLike) -> FloatArray:
     """
     with np.errstate(divide="ignore"):
         return np.asarray((np.asarray(lives, float) ** -WEIBULL_SLOPE).sum(axis=-1) ** (-1.0 / WEIBULL_SLOPE))
+
+
+def population_life(lives: ArrayLike, reliability: float = 0.9) -> float:
+    """Life that a share of a population reaches whose members have different loads: both scatter, load and life itself.
+
+    Parameters
+    ----------
+    lives : array_like, shape (n,)
+        Life of each member's load, which a share `reliability` of members with this load reaches: quantiles of Weibull
+        distributions of slope `WEIBULL_SLOPE`; any unit.
+    reliability : float
+        The share, of the population, too.
+
+    Examples
+    --------
+    >>> round(population_life([100.0, 100.0]), 6)
+    100.0
+    """
+    known = np.asarray(lives, float)
+
+    def failed(log_time: float) -> bool:
+        survive = reliability ** ((np.exp(log_time) / known) ** WEIBULL_SLOPE)
+        return bool(np.mean(survive) <= reliability)
+
+    return float(np.exp(first(failed, np.log(known.min()), np.log(known.max()))))
 
 
 def critical_amplitude(needles: int, needle_diameter: float, pitch_diameter: float) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.rating_life import population_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
@@ -126,6 +127,16 @@ class Lives:
     def valid(self) -> int:
         """Number of joints with a valid result."""
         return self.view.count(*VALID)
+
+    @property
+    def population(self) -> float:
+        """Life that a share `Bearing.reliability` of all joints reaches, their loads and lives scattering, h.
+
+        NaN where a joint has no life.
+        """
+        hours = self.hours[np.isin(self.view.status, VALID), -1]
+        limited = hours.size > 0 and bool(np.isfinite(hours).all())
+        return population_life(hours, self.bearing.reliability) if limited else np.nan
 
     @property
     def required(self) -> float:

@@ -131,7 +131,7 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             shape=(kinds, 3, LAMINAE),
         ),
         Field("needle_fit", "1", "polynomials of force, damage and power of an approach", shape=(kinds, 3, TERMS)),
-        Field("in_line", "1", "log of the force in line and without clearance, by damage", shape=(kinds, IN_LINE)),
+        Field("in_line", "1", "log of force over needle_k in line and without clearance", shape=(kinds, IN_LINE)),
         Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
         Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
         Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),

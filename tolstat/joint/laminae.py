@@ -80,7 +80,7 @@ def parameters(bearing: Bearing | None, contact: float) -> dict[str, Any]:
 
 
 def _in_line(bearing: Bearing, length: float, outer: float) -> Array:
-    """Log of the force of a bearing in line and without clearance at equidistant logs of damage, (IN_LINE,)."""
+    """Log of the force in line and without clearance, over `needle_k`, at equidistant logs of damage, (IN_LINE,)."""
     half = LAMINAE // 2  # the other half is its mirror image
     lost = relief(bearing, length, places()[:half])
     r = np.geomspace(1e-9, 1e-2, 100)[:, None] + lost.min()
@@ -91,8 +91,7 @@ def _in_line(bearing: Bearing, length: float, outer: float) -> Array:
         2.0 * stress_riser()[:half] ** OF_RINGS
     )
     wanted = LEAST_DAMAGE + np.arange(IN_LINE)
-    k = LINE_CONTACT * 1e3 ** (10.0 / 9.0) * (1e3 * length) ** (8.0 / 9.0) * bearing.needles
-    return np.asarray(np.interp(wanted, np.log(damage), np.log(k * force)))
+    return np.asarray(np.interp(wanted, np.log(damage), np.log(bearing.needles * force)))
 
 
 def _along(x: Array, cosine: Array) -> Array:

@@ -102,10 +102,10 @@ def displaced(force, start, along, across, clearance, kind, par, work):
 @njit
 def in_line(damage, kind, par):
     """Force, N, with which the bearing has a damage when pin and bearing are in line and there is no clearance."""
-    place = min(max(math.log(damage) - LEAST_DAMAGE, 0.0), IN_LINE - 1.000001)
-    k = int(place)
+    place = math.log(damage) - LEAST_DAMAGE
+    k = min(max(int(place), 0), IN_LINE - 2)
     low, high = par.in_line[kind, k], par.in_line[kind, k + 1]
-    return math.exp(low + (place - k) * (high - low))
+    return par.needle_k[kind] * math.exp(low + (place - k) * (high - low))
 
 
 @njit

@@ -123,6 +123,18 @@ def test_loads_over_a_revolution_are_those_of_laminae(law, clearance):
     assert (found["line_load"] * 0.022 > 4.08 / 32 * found["contact_max"][:, :, RESULTANT]).all()
 
 
+def test_an_ideal_joint_has_no_displacements():
+    """Its pins touch at one place: the equivalent load is that of the force."""
+    joint = joints.load("cirelli2021", {"bearing": NEEDLES}, "x")
+    par = joints.perturb(joint, OPERATION, joints.nominal_errors(1, CARDAN))
+    found = simulate_rows(par, Options(**METHODS["ideal"])).results[0]
+    plain = joints.perturb(joints.load("cirelli2021", {}, "x"), OPERATION, joints.nominal_errors(1, CARDAN))
+    by_force = simulate_rows(plain, Options(**METHODS["ideal"])).results[0]
+    np.testing.assert_allclose(found["equivalent_load"], by_force["equivalent_load"], rtol=1e-3)
+    assert np.isnan(found["line_load"]).all()
+    assert not found["tilt"].any()
+
+
 METHODS = {
     "bdf2": {},
     "tr_bdf2": {"method": int(Method.TR_BDF2)},

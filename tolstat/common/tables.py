@@ -265,7 +265,11 @@ def _result_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             Field(name, unit, f"{meaning} {OVER}", shape=(len(pins),), columns=tuple(f"{pin}.{name}" for pin in pins))
             for name, unit, meaning in (
                 ("tilt", "rad", "largest tilt of the loaded pin in its hole"),
-                ("line_load", "N/m", "largest load of a needle's lamina by its length; NaN without dimensions"),
+                (
+                    "line_load",
+                    "N/m",
+                    "largest load of a needle's lamina by its length (NaN without dimensions, or of an ideal joint)",
+                ),
             )
         ),
         *(field for kind in of_loads if kind.places == JOINT for field in kind.statistics().values()),

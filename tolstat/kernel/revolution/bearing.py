@@ -10,6 +10,7 @@ from tolstat.common.tables import LIFE_EXPONENT
 from tolstat.kernel.mechanics.cardan import PINS_OF_JOINT, travel
 from tolstat.kernel.mechanics.loads import CONTACT_FORCES, FAR, FAR_BALLS, FAR_ROLLERS, NEAR, NEAR_BALLS, NEAR_ROLLERS
 from tolstat.kernel.mechanics.motion import drive_and_load
+from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import NORMAL, RHO
 from tolstat.kernel.revolution.laminae import lamina_load
 from tolstat.kernel.simd.jit import njit
@@ -36,7 +37,7 @@ def record_ends(pin, lane, par, work, ends):
 def tilt_of(pin, ends, par):
     """Tilt of `pin` in its bearing, rad, and displacements r, along and across of `laminae.lamina_load`.
 
-    `ends` as `record_ends` writes them; zeros where a joint is ideal.
+    `ends` as `record_ends` writes them; the displacement is NaN where a joint is ideal.
     """
     kind = par.pair_kind[pin]
     apart = par.station_s[kind, 0] - par.station_s[kind, par.n_stations[kind] - 1]
@@ -74,7 +75,7 @@ def write_equivalent_loads(par, samples, out):
                     if known:
                         kind, c = par.pair_kind[pin], par.clearance[pin]
                         load, line, more[pin] = lamina_load(load, ends, more[pin], c, kind, par, work)
-                        out.line_load[pin] = max(out.line_load[pin], line)
+                        out.line_load[pin] = larger(out.line_load[pin], line)
                 out.equivalent_load[pin] += (at_output if pin < first + 2 else at_input) * load**LIFE_EXPONENT
         for pin in range(first, last):
             whole = whole_output if pin < first + 2 else whole_input

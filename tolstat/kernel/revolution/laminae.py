@@ -131,10 +131,10 @@ def lamina_load(force, ends, before, clearance, kind, par, work):
     Returns
     -------
     load, line, more : float
-        Both loads, and `before` of the next sample.
+        Both loads, and `before` of the next sample. Of an ideal joint, whose pins are not displaced: force and NaN.
     """
     if not (force > 0 and ends[0] >= 0):
-        return force, 0.0, before
+        return force, 0.0 if force == 0 else math.nan, before
     r, found = displaced(force, max(ends[0] + before, 0.0), ends[1], ends[2], clearance, kind, par, work)
     off = force / found[FORCE]
     deepest = found[DEEPEST]

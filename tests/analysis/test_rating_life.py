@@ -6,9 +6,17 @@ import doctest
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from tolstat.analysis import rating_life
-from tolstat.analysis.rating_life import A1, basic_life, critical_amplitude, system_life, turns_per_revolution
+from tolstat.analysis.rating_life import (
+    A1,
+    basic_life,
+    critical_amplitude,
+    population_life,
+    system_life,
+    turns_per_revolution,
+)
 
 
 def test_examples():
@@ -97,3 +105,15 @@ def test_small_swings_count_as_in_the_capacity_of_oscillating_bearings():
     capacities = (1.0 / turns) ** (1.0 / 4.0)  # revolutions of the shaft, as C_osc^4
     assert capacities[0] / capacities[1] == pytest.approx((swings[0] / swings[1]) ** (-2.0 / 9.0))
     assert turns_per_revolution([0.0, 0.2], 0.2).tolist() == [0.0, turns_per_revolution(0.2)]
+
+
+@pytest.mark.parametrize("reliability", [0.9, 0.99])
+def test_life_of_a_population_is_the_quantile_of_lives_drawn_from_it(reliability):
+    """Loads by scipy's log-normal, the life of each by its Weibull distribution."""
+    rng, n = np.random.default_rng(4), 400_000
+    lives = stats.lognorm(0.6).rvs(n, random_state=rng)
+    scale = lives / (-np.log(reliability)) ** (8 / 9)
+    drawn = scale * stats.weibull_min(9 / 8).rvs(n, random_state=rng)
+    found = population_life(lives[:20_000], reliability)
+    assert found == pytest.approx(np.quantile(drawn, 1 - reliability), rel=0.05)
+    assert found < 0.9 * np.median(lives)  # the quantile of the median load is no quantile of the population

@@ -89,7 +89,7 @@ NEEDLES = Campaign(
     | {
         "bearing_life": [
             *forms(f"{ROUGH}bearing-life needle_bearings.h5"),
-            'sed \'|C = "21 kN"|C = "23 kN"|\' needle_bearings.toml',
+            'sed \'|C = "33 kN"|C = "35 kN"|\' needle_bearings.toml',
             "run needle_bearings.toml --n 48 --no-report",
             "bearing-life needle_bearings.h5",
             "sed '|needles = 32|needles = 30|' needle_bearings.toml",

@@ -8,13 +8,19 @@ import pytest
 from tests.conftest import with_orders
 from tests.support import naive
 from tests.support.of_cardan import KERNEL_RESULT, SPAN
+from tolstat import joint as joints
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import CONTACTS, RESULTANT
 from tolstat.common.tables import Fidelity, Method, Options
-from tolstat.kernel.revolution.bearing import write_equivalent_loads
+from tolstat.joint import Operation
+from tolstat.kernel.revolution.bearing import tilt_of, write_equivalent_loads
 from tolstat.kernel.revolution.settle import make_samples
 from tolstat.solver.simulation import simulate_rows
 
 P = 10 / 3
+NEEDLES = {"needles": 32, "needle_length": "22 mm", "needle_diameter": "4 mm", "pitch_diameter": "42 mm"}
+PLAIN = {"needles": 32, "needle_length": "22 mm"}
+OPERATION = Operation.model_construct(alpha=np.radians(15), speed=50.0, torque=300.0)
 ALPHA = np.radians(20)
 
 
@@ -78,6 +84,55 @@ def test_no_force_and_no_result(params):
     forces = np.ones((180, 4))
     forces[7, 2] = np.nan
     assert np.isnan(kernel(forces, params(alpha=ALPHA))).tolist() == [False, False, True, False]
+
+
+@pytest.mark.parametrize("law", ["mode", "needles"])
+def test_tilt_and_place_of_a_pin_follow_from_its_end_stations(law, params):
+    """Any displacements of the ends, as vectors across the hole."""
+    joint = joints.load("cirelli2021", {"contact": {"law": law}, "bearing": NEEDLES}, "x")
+    par = joints.perturb(joint, OPERATION, joints.nominal_errors(1, CARDAN)).view(np.recarray)[0]
+    s = par.station_s[0, : par.n_stations[0]]
+    for outer, inner in np.random.default_rng(5).uniform(-1e-4, 1e-4, (20, 2, 2)):
+        products = np.array([outer @ outer, outer @ inner, inner @ inner])
+        tilt, (r, along, across) = tilt_of(0, products, par)
+        middle, beyond = 0.5 * (outer + inner), (outer - inner) / (s[0] - s[-1]) * 0.011
+        np.testing.assert_allclose(tilt, np.hypot(*beyond) / 0.011)
+        np.testing.assert_allclose(r, np.hypot(*middle))
+        np.testing.assert_allclose(
+            (along, across), (beyond @ middle / r, abs(beyond[0] * middle[1] - beyond[1] * middle[0]) / r), rtol=1e-6
+        )
+
+
+@pytest.mark.parametrize(("law", "clearance"), [("needles", "0.01 mm"), ("mode", "0.01 mm")])
+def test_loads_over_a_revolution_are_those_of_laminae(law, clearance):
+    """Sampled loads of a simulated joint: its pins lie between in line and at one end, loads rise with its tilt."""
+    overrides = {"contact": {"law": law, "clearance": clearance}, "bearing": NEEDLES}
+    joint = joints.load("cirelli2021", overrides, "x")
+    errors = joints.nominal_errors(3, CARDAN)
+    errors["pin1.tilt_z"] = np.radians([0.0, 0.05, 0.1])
+    par = joints.perturb(joint, OPERATION, errors)
+    plain = joints.load("cirelli2021", overrides | {"bearing": PLAIN}, "x")
+    found, by_force = (simulate_rows(p, Options()).results for p in (par, joints.perturb(plain, OPERATION, errors)))
+    np.testing.assert_array_equal(found["contact_max"], by_force["contact_max"])
+    assert (found["equivalent_load"] > 1.05 * by_force["equivalent_load"]).all()
+    assert (np.diff(found["tilt"][:, 0]) > 5e-4).all()
+    assert (np.diff(found["equivalent_load"][:, 0]) > 0).all()
+    assert (np.diff(found["line_load"][:, 0]) > 0).all()
+    assert np.isnan(by_force["line_load"]).all()
+    # the most loaded needle takes at least what it takes in line without clearance: 4.08 F/Z
+    assert (found["line_load"] * 0.022 > 4.08 / 32 * found["contact_max"][:, :, RESULTANT]).all()
+
+
+def test_an_ideal_joint_has_no_displacements():
+    """Its pins touch at one place: the equivalent load is that of the force."""
+    joint = joints.load("cirelli2021", {"bearing": NEEDLES}, "x")
+    par = joints.perturb(joint, OPERATION, joints.nominal_errors(1, CARDAN))
+    found = simulate_rows(par, Options(**METHODS["ideal"])).results[0]
+    plain = joints.perturb(joints.load("cirelli2021", {}, "x"), OPERATION, joints.nominal_errors(1, CARDAN))
+    by_force = simulate_rows(plain, Options(**METHODS["ideal"])).results[0]
+    np.testing.assert_allclose(found["equivalent_load"], by_force["equivalent_load"], rtol=1e-3)
+    assert np.isnan(found["line_load"]).all()
+    assert not found["tilt"].any()
 
 
 METHODS = {

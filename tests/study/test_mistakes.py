@@ -176,7 +176,7 @@ def test_bearings_and_unbalance_of_shafts(folder: Path, written: str, expected: 
     ("written", "remedy"),
     [
         ('snap_rings.end_play = "0.02 mm"', "snap rings and cups are thrust: thrust = {"),
-        ('bearing.C0 = "12 kN"', "the static load rating is used nowhere: leave it out"),
+        ('bearing.C0r = "12 kN"', "give bearing.C0, or leave it out"),
         ("friction.coefficient_of_friction = 0.05", "this is friction.mu under [joint]"),
         ("mu = 0.05", "this is friction.mu under [joint]"),
         ('end_play = "0.02 mm"', "this play of the cross is thrust.end_play under [joint]"),

@@ -46,6 +46,7 @@ def results(n, seed=8, failed=0, unsettled=0):
             table[f"{kind.key}_range"] = 0.2 * table[f"{kind.key}_max"]
     table["mode_share"][:, :, 1] = 1.0
     table["equivalent_load"] = 600.0 * (1.0 + scatter[:, :4])
+    table["tilt"], table["line_load"] = 1e-3 * (1.0 + scatter[:, :4]), 5e4 * (1.0 + scatter[:, :4])
     table["revolutions"], table["steps"], table["closure"] = 2.0, 360, 2e-5
     table["status"][n - unsettled :] = Status.NOT_SETTLED
     table["settled"][n - unsettled :] = 0

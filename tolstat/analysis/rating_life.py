@@ -10,11 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT
 
 WEIBULL_SLOPE = 9 / 8
 """Slope e of the lives of bearings with line contact (Lundberg and Palmgren 1952): combines bearings of a joint."""
+STEEL = 206e9 / (1.0 - 0.3**2)
+"""Young's modulus of steel over 1 - nu^2, Pa."""
 FRETTING = 0.5
 """Part of the critical amplitude below which fretting is to be expected (Harris, Rumbarger and Butterfield 2009)."""
 _RELIABILITY = (0.9, 0.95, 0.96, 0.97, 0.98, 0.99, 0.992, 0.994, 0.996, 0.998, 0.999, 0.9992, 0.9994, 0.9995)
@@ -45,6 +48,30 @@ def basic_life(load: ArrayLike, rating: ArrayLike) -> FloatArray:
     """
     with np.errstate(divide="ignore"):
         return np.asarray(1e6 * (np.asarray(rating, float) / np.asarray(load, float)) ** LIFE_EXPONENT)
+
+
+def line_pressure(line_load: ArrayLike, needle: ArrayLike, pin: ArrayLike) -> FloatArray:
+    """Largest pressure between a needle and a pin of steel (Hertz 1882).
+
+    Parameters
+    ----------
+    line_load : array_like
+        Force by length, N/m.
+    needle, pin : array_like
+        Diameters, m.
+
+    Returns
+    -------
+    ndarray
+        Pa.
+
+    Examples
+    --------
+    >>> round(float(line_pressure(100e3, 4e-3, 38e-3)) / 1e6)  # MPa
+    1411
+    """
+    curvature = 2.0 / np.asarray(needle, float) + 2.0 / np.asarray(pin, float)
+    return np.asarray(np.sqrt(np.asarray(line_load, float) * STEEL / (2.0 * np.pi) * curvature))
 
 
 def turns_per_revolution(alpha: ArrayLike, critical: ArrayLike = 0.0) -> FloatArray:
@@ -95,6 +122,31 @@ def system_life(lives: ArrayLike) -> FloatArray:
     """
     with np.errstate(divide="ignore"):
         return np.asarray((np.asarray(lives, float) ** -WEIBULL_SLOPE).sum(axis=-1) ** (-1.0 / WEIBULL_SLOPE))
+
+
+def population_life(lives: ArrayLike, reliability: float = 0.9) -> float:
+    """Life that a share of a population reaches whose members have different loads: both scatter, load and life itself.
+
+    Parameters
+    ----------
+    lives : array_like, shape (n,)
+        Life of each member's load, which a share `reliability` of members with this load reaches: quantiles of Weibull
+        distributions of slope `WEIBULL_SLOPE`; any unit.
+    reliability : float
+        The share, of the population, too.
+
+    Examples
+    --------
+    >>> round(population_life([100.0, 100.0]), 6)
+    100.0
+    """
+    known = np.asarray(lives, float)
+
+    def failed(log_time: float) -> bool:
+        survive = reliability ** ((np.exp(log_time) / known) ** WEIBULL_SLOPE)
+        return bool(np.mean(survive) <= reliability)
+
+    return float(np.exp(first(failed, np.log(known.min()), np.log(known.max()))))
 
 
 def critical_amplitude(needles: int, needle_diameter: float, pitch_diameter: float) -> float:

@@ -104,10 +104,10 @@ SHAFT = drive_shaft("shaft", "tube")
 """Drive shaft of two joints and a tube."""
 SPLINED = drive_shaft("splined shaft", "tube1", "tube2")
 """Drive shaft of two joints and two tubes, which slide in one another by a spline."""
-PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline")
+PARTS = ("thrust", "friction", "input_bearings", "output_bearings", "unbalance", "lateral", "spline", "root")
 """What a mechanism of Cardan joints may have beside: thrust faces, friction of pins, loads of the bearings that carry
 its first and its last shaft; unbalance of the tubes and of the last shaft, displacement of that across its axis, a
-spline that sticks."""
+spline that sticks; stress at the roots of the pins."""
 
 
 BALANCED = ("tube", "tube1", "tube2", "output")
@@ -132,6 +132,7 @@ def _with(base: Mechanism, parts: Collection[str]) -> Mechanism:
         friction="friction" in parts,
         unbalanced=tuple(body for body in base.bodies if body in BALANCED) if "unbalance" in parts else (),
         spline=base.spline or "spline" in parts,
+        roots=tuple(bushing.name for bushing in base.bushings if bushing.group == "cross") if "root" in parts else (),
     )
 
 

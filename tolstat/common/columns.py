@@ -72,7 +72,7 @@ def result_columns(mechanism: Mechanism) -> tuple[Column, ...]:
 def optional_columns(mechanism: Mechanism) -> tuple[Column, ...]:
     """Columns of the results that a study may leave out."""
     of_loads = {field.name for kind in kinds(mechanism).values() for field in kind.statistics().values()}
-    optional = {"mode_share", "equivalent_load", "clearance"} | of_loads
+    optional = {"mode_share", "equivalent_load", "tilt", "line_load", "clearance"} | of_loads
     return tuple(column for column in result_columns(mechanism) if column.field in optional)
 
 

@@ -166,6 +166,7 @@ _MOMENT = f"bending moment of the shaft about the joint's centre {OVER}"
 _THRUST = f"force of the thrust face {OVER}"
 _BEARING = f"radial load of the shaft's bearing {OVER}"
 _EQUIVALENT = "radial load of the shaft's bearing, mean over any revolution with exponent"
+_STRESS = f"stress at the root of the pin, of bending and torsion together (von Mises), {OVER}"
 _LOSS = "mean power that friction takes in a pin's bearing, or in all, of any revolution"
 _DRIVE = f"torque about the input shaft {OVER}"
 
@@ -204,6 +205,7 @@ def all_kinds(mechanism: Mechanism) -> dict[str, Kind]:
             Kind(key, key, noun, "N", _BEARING, borne, measure=F, modulus=True)
             for key, noun in (("bearing_a", "load of bearing a"), ("bearing_b", "load of bearing b"))
         ),
+        Kind("stress", "stress", "stress at the root", "Pa", _STRESS, mechanism.roots, modulus=True),
     ]
     of_orders = (
         ("lateral", "lateral force", "N", shafts, F),

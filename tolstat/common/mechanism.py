@@ -209,6 +209,8 @@ class Mechanism(NamedTuple):
         Lump that the resisting torque acts on, against z of its member; empty: it acts on the last unknown rotation.
     forces : tuple of Force
         Given forces.
+    roots : tuple of str
+        Bushings at whose base the stress is known.
     """
 
     name: str
@@ -227,6 +229,7 @@ class Mechanism(NamedTuple):
     waves: int = 0
     loaded: str = ""
     forces: tuple[Force, ...] = ()
+    roots: tuple[str, ...] = ()
 
     @property
     def placed(self) -> int:
@@ -341,6 +344,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
         "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],
         "bushing_kind": kinds,
+        "root": [i for i, bushing in enumerate(mechanism.bushings) if bushing.name in mechanism.roots],
         "pushed": [i for i, bushing in enumerate(mechanism.bushings) if bushing.pushed],
         "bushing_block": blocks,
         "pin": [body[pair.pin] for pair in mechanism.pairs],

@@ -18,6 +18,17 @@ MAX_STATIONS = 16
 MAX_ORDERS = 32
 """Maximum number of different orders of speed and torque: 16 of each."""
 
+LAMINAE, TERMS = 30, 5
+"""Laminae of a needle, the smallest number that ISO/TS 16281 admits; coefficients of a polynomial of `needle_fit`."""
+PLACE, RELIEF, EDGES = range(3)
+"""Rows of `lamina`."""
+OF_FORCE, OF_DAMAGE, OF_POWER = range(3)
+"""Rows of `needle_fit`."""
+ACROSS_NEEDLES = 1e-5
+"""Unit of an approach in the fit of its power, m."""
+IN_LINE, LEAST_DAMAGE = 40, -80.0
+"""Number and first of the natural logarithms of damage of `in_line`, in steps of 1."""
+
 
 @cache
 def numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
@@ -116,6 +127,17 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("station_k3", "N/m^(9/8)", "coefficient of each station's needles", shape=(kinds, MAX_STATIONS)),
         Field("station_weight", "1", "weight of each station's damping and film", shape=(kinds, MAX_STATIONS)),
         Field("needle_b", "1", "share b of the clearance in the force of needles; 0: no needles", shape=(kinds,)),
+        Field("needle_k", "N/m^(10/9)", "stiffness of a needle; 0: not known", shape=(kinds,)),
+        Field("needles", "1", "needles of a bearing", shape=(kinds,)),
+        Field("needle_half", "m", "half of the length of a needle", shape=(kinds,)),
+        Field(
+            "lamina",
+            "1, m, 1",
+            "laminae of a needle: place from -1 to 1, approach that the profile takes off, weight in damage",
+            shape=(kinds, 3, LAMINAE),
+        ),
+        Field("needle_fit", "1", "polynomials of force, damage and power of an approach", shape=(kinds, 3, TERMS)),
+        Field("in_line", "1", "log of force over needle_k in line and without clearance", shape=(kinds, IN_LINE)),
         Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
         Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
         Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),
@@ -146,6 +168,12 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
             "kg*m",
             "unbalance of a body along x and y of its frame",
             shape=(len(mechanism.unbalanced), 2),
+        ),
+        Field(
+            "of_root",
+            "1/m^3",
+            "stress at the root of a pin by bending and by torsional moment",
+            shape=(len(mechanism.roots), 2),
         ),
         Field(mark_of(mechanism), "1", "mark of the mechanism's numbers", "f8", (0,)),
         *(

@@ -22,7 +22,7 @@ from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
 from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import numbers, param_fields
 
-SCHEMA_VERSION = 14
+SCHEMA_VERSION = 15
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""
@@ -256,10 +256,21 @@ def _result_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field(
             "equivalent_load",
             "N",
-            "dynamic equivalent load of the pin's bearing: mean of the resultant contact force with exponent 10/3, "
-            f"weighted by the travel of the pin in its hole, {OVER}",
+            "dynamic equivalent load of the pin's bearing: by laminae if its dimensions are given, else the resultant "
+            f"contact force; mean with exponent 10/3, weighted by the travel of the pin in its hole, {OVER}",
             shape=(len(pins),),
             columns=tuple(f"{pin}.equivalent_load" for pin in pins),
+        ),
+        *(
+            Field(name, unit, f"{meaning} {OVER}", shape=(len(pins),), columns=tuple(f"{pin}.{name}" for pin in pins))
+            for name, unit, meaning in (
+                ("tilt", "rad", "largest tilt of the loaded pin in its hole"),
+                (
+                    "line_load",
+                    "N/m",
+                    "largest load of a needle's lamina by its length (NaN without dimensions, or of an ideal joint)",
+                ),
+            )
         ),
         *(field for kind in of_loads if kind.places == JOINT for field in kind.statistics().values()),
         *(field for kind in of_loads for field in kind.ends()),

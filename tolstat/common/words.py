@@ -8,7 +8,7 @@ _MEANT = {
     "end play, axial play, axial clearance, end float": "this play of the cross is thrust.end_play under [joint]",
     "preload": "preload is a negative thrust.end_play under [joint]",
     "friction, mu, friction coefficient, coefficient of friction, cof": "this is friction.mu under [joint]",
-    "c0, c0r, static load rating": "the static load rating is used nowhere: leave it out; C is the dynamic one",
+    "c0r, static load rating": "give bearing.C0, or leave it out: it follows from the dimensions",
     "cr, dynamic load rating, load rating": "this is bearing.C under [joint]",
     "unbalance, imbalance, balance, balance grade": (
         "this is shaft.unbalance under [joint], of tubes tube.unbalance in [shaft]"

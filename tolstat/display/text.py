@@ -70,7 +70,9 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
 
 
 def multiple(largest: float, unit: str) -> tuple[float, str]:
-    """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on."""
+    """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on; MPa."""
+    if unit == "Pa":
+        return 1e6, "MPa"
     kilo = unit in ("N", "N*m") and abs(largest) >= 1e4
     return (1e3, f"k{loads.unit_text(unit)}") if kilo else (1.0, loads.unit_text(unit))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
@@ -20,8 +20,12 @@ from tolstat.common.strict import Strict, refuse
 from tolstat.joint.material import Array
 from tolstat.joint.sections import Force, Length, Number
 
-FOR_LIFE = ("C", "needle_diameter", "pitch_diameter")
+DIAMETERS = ("needle_diameter", "pitch_diameter")
+"""Keys without which loads are not distributed over laminae."""
+FOR_LIFE = ("C", *DIAMETERS)
 """Keys without which a bearing has no rating life."""
+AFFECT_LOADS = ("needles", "needle_length", *DIAMETERS, "profile", "end_relief")
+"""Keys that affect loads or equivalent loads of a joint; others may be edited after it is simulated."""
 LEFT_OUT: Any = None
 """Default of a key that one purpose needs and another does not; `Bearing.lacking` is asked before it is read."""
 
@@ -36,19 +40,28 @@ def _tabulated(reliability: float) -> float:
 class Bearing(Strict):
     """Needle bearing of each of the four pins.
 
-    With the contact law `needles` its `needles` and `needle_length` say how stiff it is; the other keys affect no load.
+    With the contact law `needles` its `needles` and `needle_length` say how stiff it is. Equivalent loads follow from
+    its dimensions; the other keys affect no load.
     """
 
     needles: int = Field(strict=True, ge=3, le=1000, examples=[32])
     """needles of one bearing"""
     needle_length: Length = Field(default=LEFT_OUT, examples=["22 mm"])
-    """length of a needle, needed with law `needles`"""
+    """length of a needle, needed with law `needles`; by default that of the contact"""
     C: Force = Field(default=LEFT_OUT, examples=["30 kN"])
-    """basic dynamic load rating of one bearing (ISO 281), needed for the life"""
+    """basic dynamic load rating of one bearing; left out: by ISO 281 from the dimensions"""
+    C0: Force | None = Field(default=None, examples=["45 kN"])
+    """basic static load rating of one bearing; left out: by ISO 76 from the dimensions"""
+    rings: Literal["drawn", "machined"] = Field(default="drawn", examples=["machined"])
+    """drawn cup or machined rings, for C by ISO 281: b_m = 1 or 1.1"""
     needle_diameter: Length = Field(default=LEFT_OUT, examples=["4 mm"])
     """diameter of a needle, needed for the life"""
     pitch_diameter: Length = Field(default=LEFT_OUT, examples=["42 mm"])
     """diameter of the circle of the needles' axes, needed for the life"""
+    profile: Literal["crowned", "logarithmic"] = Field(default="logarithmic", examples=["crowned"])
+    """profile of a needle along its length, with `end_relief`"""
+    end_relief: Length | None = Field(default=None, examples=["5 um"])
+    """by how much the profile is lower in the middle of the outermost of 30 laminae; left out: needles are cylinders"""
     required_life: units.Time | None = Field(default=None, examples=["5000 h"])
     """life that all four bearings of a joint must reach"""
     reliability: Annotated[units.Number, AfterValidator(_tabulated)] = Field(default=0.9, examples=["95 %"])
@@ -67,8 +80,18 @@ class Bearing(Strict):
         return value
 
     def lacking(self, keys: Iterable[str]) -> list[str]:
-        """Those of `keys` that are left out."""
-        return [key for key in keys if getattr(self, key) is None]
+        """Those of `keys` that are left out; `C` counts where it does not follow from the dimensions."""
+        return [key for key in keys if getattr(self, key) is None and (key != "C" or self.needle_length is None)]
+
+    @property
+    def dynamic_rating(self) -> float:
+        """C, N: the one that is given, or that of ISO 281."""
+        return self.C or ratings(self)[0]
+
+    @property
+    def static_rating(self) -> float:
+        """C0, N: the one that is given, or that of ISO 76; NaN without the length of the needles."""
+        return self.C0 or (ratings(self)[1] if self.needle_length else math.nan)
 
     @property
     def critical_amplitude(self) -> float:
@@ -86,6 +109,24 @@ class Bearing(Strict):
         return f"L{100.0 * (1.0 - self.reliability):.3g}{'' if self.a_iso is None else 'm'}"
 
 
+def ratings(bearing: Bearing) -> tuple[float, float]:
+    """Ratings C and C0, N, of a bearing from its dimensions: ISO 281:2007, 7.1, and ISO 76:2006, 6.1.
+
+    The factor f_c of Table 7 is written out as Lundberg and Palmgren (1952) have it, with lambda nu = 0.83
+    (ISO/TR 1281-1:2008).
+    """
+    Z, D, L = bearing.needles, 1e3 * bearing.needle_diameter, 1e3 * bearing.needle_length
+    gamma = bearing.needle_diameter / bearing.pitch_diameter
+    narrow = (1.0 - gamma) / (1.0 + gamma)
+    f_c = 0.83 * 207.9 * gamma ** (2.0 / 9.0) * (1.0 - gamma) ** (29.0 / 27.0) / (1.0 + gamma) ** 0.25
+    f_c *= (1.0 + (1.04 * narrow ** (143.0 / 108.0)) ** 4.5) ** (-2.0 / 9.0)
+    b_m = 1.1 if bearing.rings == "machined" else 1.0
+    C = b_m * f_c * L ** (7.0 / 9.0) * Z**0.75 * D ** (29.0 / 27.0)
+    return C, 44.0 * (1.0 - gamma) * Z * L * D
+
+
+LINE_CONTACT = 35948.0
+"""Spring constant of a needle between both rings, N/mm^2; times length^(8/9) approach^(10/9) (ISO/TS 16281:2008)."""
 LOADS = 41
 """Number of displacements at which the fit samples the force."""
 RANGE = 100.0
@@ -135,12 +176,27 @@ def needle_force(delta: Array, clearance: float, needles: int, length: float) ->
     ndarray, shape (n,)
         Force (N) along the displacement.
     """
-    last = 2.0 * np.arcsin(np.sqrt(0.5 * delta / (clearance + delta)))[:, None]  # the last needle that is loaded
+    load = LINE_CONTACT * (1e3 * length) ** (8.0 / 9.0) * (1e3 * delta) ** (10.0 / 9.0)
+    return np.asarray(
+        needles * load * loaded(delta / (clearance + delta), lambda x, cosine: x ** (10.0 / 9.0) * cosine)
+    )
+
+
+def loaded(share: Array, function: Callable[[Array, Array], Array]) -> Array:
+    """Mean over all needles of a function of the approach, in units of the largest one, and of the cosine of the angle.
+
+    Parameters
+    ----------
+    share : ndarray, shape (n,)
+        Largest approach over the displacement of the pin.
+    function : callable
+        Of arrays (n, m); 0 for needles without load.
+    """
+    last = 2.0 * np.arcsin(np.sqrt(0.5 * share))[:, None]  # the last needle that is loaded
     nodes, weights = _quadrature()
     phi = last * nodes
-    pressed = delta[:, None] - 2.0 * (clearance + delta)[:, None] * np.sin(0.5 * phi) ** 2
-    load = 35948.0 * (1e3 * length) ** (8.0 / 9.0) * (1e3 * np.maximum(pressed, 0.0)) ** (10.0 / 9.0)
-    return np.asarray(needles / math.pi * last[:, 0] * ((load * np.cos(phi)) @ weights))
+    pressed = np.maximum(1.0 - 2.0 / share[:, None] * np.sin(0.5 * phi) ** 2, 0.0)
+    return np.asarray(last[:, 0] / math.pi * (function(pressed, np.cos(phi)) @ weights))
 
 
 @cache  # at the first use: numpy.polynomial takes long to import

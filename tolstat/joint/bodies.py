@@ -65,6 +65,8 @@ def write(
     for name, of_kinds in _of_kinds(own, shaft).items():
         kinds = mechanism.lump_kinds if name in OF_LUMPS else mechanism.bushing_kinds
         params[name] = [of_kinds[kind] for kind in kinds]
+    if roots := [own[name.rpartition("cross")[0]].pin.root for name in mechanism.roots]:
+        params["of_root"] = [root.factors if root else (0.0, 0.0) for root in roots]
     lumps = mechanism.lumps
     triads = dict(zip([lump.name for lump in lumps], _triads([lump.quarters % OBLIQUE for lump in lumps]), strict=True))
     if shaft is not None:

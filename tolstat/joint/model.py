@@ -17,7 +17,7 @@ from tolstat.common.loads import loads_of
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import MAX_SHIFT, tables
 from tolstat.joint import derived
-from tolstat.joint.bearing import Bearing
+from tolstat.joint.bearing import AFFECT_LOADS, Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
@@ -28,7 +28,7 @@ GIVEN_BY = dict(
         PARTS,
         (
             *("thrust", "friction.mu", "shaft.input", "shaft.output"),
-            *("shaft.unbalance", "shaft.lateral", "shaft.spline"),
+            *("shaft.unbalance", "shaft.lateral", "shaft.spline", "pin.root"),
         ),
         strict=True,
     )
@@ -50,17 +50,15 @@ def giving(pattern: str) -> str:
     return next((key for key, own in of_parts if any(fnmatchcase(name, pattern) for name in own)), "")
 
 
-def affects_results(key: str, law: str | None = None) -> bool:
-    """Whether a dotted key of a joint affects results of its simulation with a contact law; None: with any."""
+def affects_results(key: str) -> bool:
+    """Whether a dotted key of a joint affects results of its simulation."""
     section, _, name = key.partition(".")
-    laws = LAWS.values() if law is None else [LAWS[law]]
-    return section not in TOLD and (section != "bearing" or any(name in with_law.of_bearing for with_law in laws))
+    return section not in TOLD and (section != "bearing" or name in AFFECT_LOADS)
 
 
 def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
     """Values of a joint by dotted key, of sections as `Joint.given` returns them, that affect results."""
-    values = leaves(given)
-    return {key: value for key, value in values.items() if affects_results(key, values.get("contact.law"))}
+    return {key: value for key, value in leaves(given).items() if affects_results(key)}
 
 
 class Assumed(Strict):
@@ -99,7 +97,7 @@ class Joint(Strict):
     contact: Contact
     bearing: Bearing | None = Field(default=None, validate_default=True)
     """Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` and `needle_length`
-    say how stiff it is; other keys are for its rating life and affect no load"""
+    say how stiff it is; other keys are for its rating life"""
     assumed: tuple[Assumed, ...] = Field(
         default=(), examples=[[{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}]]
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tolstat.common.mechanism import Mechanism, with_play
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.tables import FACTORS, blank_params, tables
-from tolstat.joint import bodies, linked, orders
+from tolstat.joint import bodies, laminae, linked, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
@@ -116,6 +116,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     params["k"] *= factor[:, None, None]
     for name in ("station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None, None]
+    params["needle_k"] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         params["c"] *= np.sqrt(factor)[:, None, None]
     held = {}
@@ -160,6 +161,7 @@ def _of_pairs(joint: Joint) -> dict[str, Any]:
         "station_k3": np.pad(stations.k3, unused),
         "station_weight": np.pad(stations.weight, unused),
         "needle_b": stations.b,
+        **laminae.parameters(joint.bearing, contact.z),
     }
 
 

@@ -15,6 +15,7 @@ from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
+from tolstat.joint.root import Root
 from tolstat.joint.spline import Coefficient, Spline
 
 Length = Annotated[units.Length, POSITIVE]
@@ -112,6 +113,8 @@ class Pin(Strict):
     Jp: units.AreaMoment = follows("pin.Jp", "polar moment of the section")
     mass: units.Mass = follows("pin.mass", "mass")
     inertia: Triple = follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)
+    root: Root | None = None
+    """Section of each pin at the hub, where stress is a load"""
 
 
 class Arm(Strict):

@@ -29,7 +29,7 @@ from tolstat.joint.spline import Spline
 
 PLANES = {"Z": math.pi, "W": 0.0}
 """Angle of the plane of joint 2 ahead of that of joint 1, of arrangements by their names."""
-OF_FIRST, OF_SECOND = {"thrust", "friction", "input_bearings"}, {*PARTS} - {"input_bearings"}
+OF_FIRST, OF_SECOND = {"thrust", "friction", "input_bearings", "root"}, {*PARTS} - {"input_bearings"}
 """Parts that joint 1 gives a drive shaft, and those that joint 2 gives it."""
 STEEL = 7850.0
 """Density of a tube that is given by its section, kg/m^3."""

@@ -14,6 +14,8 @@ the couple T / cos(gamma) on the cross along its normal, and the secondary coupl
 
 import math
 
+import numpy as np
+
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
@@ -22,7 +24,7 @@ from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies, throw
 from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
-from tolstat.kernel.mechanics.work import FORCE
+from tolstat.kernel.mechanics.work import FORCE, RHO
 from tolstat.kernel.simd.jit import njit
 
 NONE, ONE_POINT = int(Mode.NONE), int(Mode.ONE_POINT)
@@ -114,6 +116,7 @@ def touch(pin, radius, force, par, work):
     work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
     work.contact[pin, INNER] = 0.0
     work.mode[pin] = ONE_POINT if size > 0 else NONE
+    work.station[pin, :, RHO] = np.nan  # it has no displacement
     on_hole = to_hole(par.hinge[pin], force, par, work)
     for body, off in ((par.pin[pin], scale(-1.0, force)), (hole, on_hole)):
         lever = from_triad(body, (radius - par.R, 0.0, 0.0), par)

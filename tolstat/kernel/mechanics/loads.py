@@ -12,9 +12,9 @@ from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
-(FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE, THRUST, NEAR, FAR) = range(11)
-LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS = range(11, 17)
-NEAR_BALLS, NEAR_ROLLERS, FAR_BALLS, FAR_ROLLERS, LOSS = range(17, 22)
+(FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR, AXIAL, LATERAL, MOMENT, DRIVE, THRUST, NEAR, FAR, STRESS) = range(12)
+LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS, NEAR_ORDERS, FAR_ORDERS = range(12, 18)
+NEAR_BALLS, NEAR_ROLLERS, FAR_BALLS, FAR_ROLLERS, LOSS = range(18, 23)
 """Kinds, in the order of `load_kinds.all_kinds`; ``par.begin`` has the first element of each."""
 OF_FORCES, OF_TORQUES = range(2)
 """Measures, whose largest load changes are relative to: rows of ``par.measured`` and ``par.of_measure``."""
@@ -113,6 +113,10 @@ def write_loads(v, par, work):
         near_y, far_y = bearing_loads(i, f[1], -m[0], par)
         loads[begin[NEAR] + i] = near_x * near_x + near_y * near_y
         loads[begin[FAR] + i] = far_x * far_x + far_y * far_y
+    for i in range(par.root.shape[0]):
+        torsion = par.of_root[i, 1] * work.load[par.root[i], 3]
+        t, z = par.of_root[i, 0] * work.load[par.root[i], 4], par.of_root[i, 0] * work.load[par.root[i], 5]
+        loads[begin[STRESS] + i] = t * t + z * z + 3 * torsion * torsion
 
 
 @njit

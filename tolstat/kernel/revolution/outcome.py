@@ -80,7 +80,7 @@ def clear_results(out):
     for pin in range(out.mode_share.shape[0]):
         for k in range(out.mode_share.shape[1]):
             out.mode_share[pin, k] = nan
-        out.equivalent_load[pin] = nan
+        out.equivalent_load[pin] = out.tilt[pin] = out.line_load[pin] = nan
 
 
 @njit

@@ -13,7 +13,7 @@ from tolstat.kernel.mechanics.loads import LOSS, OF_FORCES, OF_TORQUES, complete
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import DAMPING, FORCE, SLOPE
-from tolstat.kernel.revolution.bearing import write_bearings, write_equivalent_loads
+from tolstat.kernel.revolution.bearing import STRIDE, record_ends, write_bearings, write_equivalent_loads
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
@@ -41,6 +41,7 @@ def sample_dtype(mechanism):
             ("mode", "u1", (pins,)),
             ("pressed", "u4", (pins,)),  # bit j: station j of the pin carries a force; the next bit: its face
             ("stuck", "u2", (pins,)),  # bit j: station j sticks
+            ("ends", "f8", (pins, 3)),  # of every `STRIDE`-th sample, see `bearing.record_ends`; m^2
             ("q", "f8", (mechanism.dof,)),  # m, rad
             ("v", "f8", (mechanism.dof,)),  # per s
         ],
@@ -150,6 +151,8 @@ def record(k, lane, par, work, samples):
     for pin in range(work.mode.shape[0]):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin], sample.stuck[pin] = pressed(pin, lane, par, work), stuck(pin, lane, par, work)
+        if k % samples.size % STRIDE == 0:
+            record_ends(pin, lane, par, work, sample.ends[pin])
 
 
 @njit

@@ -183,6 +183,10 @@ def combine(last, count, trail, out):
                 out.mode_share[pin, mode] += trail.revolution[r % capacity].mode_share[pin, mode] / count
     for pin in range(out.mode_share.shape[0]):
         total = 0.0
+        out.tilt[pin] = out.line_load[pin] = 0.0
         for r in range(last - count + 1, last + 1):
-            total += trail.revolution[r % capacity].equivalent_load[pin] ** LIFE_EXPONENT
+            statistics = trail.revolution[r % capacity]
+            total += statistics.equivalent_load[pin] ** LIFE_EXPONENT
+            out.tilt[pin] = max(out.tilt[pin], statistics.tilt[pin])
+            out.line_load[pin] = larger(out.line_load[pin], statistics.line_load[pin])
         out.equivalent_load[pin] = (total / count) ** (1 / LIFE_EXPONENT)

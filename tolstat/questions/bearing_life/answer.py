@@ -20,10 +20,13 @@ from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolv
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions import shares
 from tolstat.questions.bearing_life import lives as rating
+from tolstat.store import recorded
 from tolstat.store.view import View
 
 FEW = "needs more joints"
 UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
+OF_BEARING = {"load": "N", "tilt": "rad", "life": "h", "safety": "1", "pressure": "Pa"}
+"""Quantities of the table ``bearings``, with their units."""
 UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
 
@@ -51,11 +54,22 @@ LIVES = (
     Column(f"95 % interval of {100.0 * rating.SHARES[-1]:g} %", lambda row: _span(row[rating.SHARES[-1]])),
 )
 """Columns of the table ``lives`` after the bearing, arranged by place."""
-LOADS = (
-    Column("nominal", lambda row: text.value(row[rating.SHARES[-1]]["nominal_load"], "N")),
-    *of_shares(rating.SHARES, "up to", lambda row: text.value(row["load"], "N")),
+
+
+def _last(name: str, unit: str, size: float = 1.0) -> shares.Cell:
+    """Make a cell of the row of the largest share, by place; `size` of `unit` in SI."""
+    return lambda row: text.value(row[rating.SHARES[-1]][name] / size, unit)
+
+
+BEARINGS = (
+    Column("P nominal", _last("nominal_load", "N"), rank=1),
+    Column("P", _last("load", "N")),
+    Column("tilt", _last("tilt", "mrad", 1e-3)),
+    Column("life", lambda row: _hours(row[rating.SHARES[-1]]["life"])),
+    Column("C0/P0", _last("safety", "1")),
+    Column("pressure", _last("pressure", "Pa")),
 )
-"""Columns of the table ``loads`` after the bearing, arranged by place."""
+"""Columns of the table ``bearings`` after the bearing, arranged by place: those of the largest share."""
 BELOW = (
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: "-" if _undecided(row) else text.percent(row["estimate"])),
@@ -76,12 +90,12 @@ def bearing_life(view: View) -> Answer:
     """Compute the life of the pins' bearings.
 
     Gives the life that 50, 90 and 99 % of the joints reach, for each bearing and for all of them together, the share of
-    the joints that do not reach the required life, each with its 95 % interval, the dynamic equivalent loads, and how
-    the bearings are loaded.
+    the joints that do not reach the required life, each with its 95 % interval, load, tilt, static safety and pressure
+    of each bearing, and how the bearings are loaded.
 
-    The bearings are those of [bearing] in the joint file, or of [joint.bearing] in the study. To change them, edit the
-    file and repeat tolstat run: no joint is simulated again. With contact.law = "needles" the keys needles and
-    needle_length are part of the campaign: to change them, run the study into another file.
+    The bearings are those of [bearing] in the joint file, or of [joint.bearing] in the study. Their dimensions are part
+    of the campaign: to change them, run the study into another file. To change ratings, required life, reliability or
+    a_iso, edit the file and repeat tolstat run: no joint is simulated again.
 
     Example: tolstat bearing-life needle_bearings.h5
 
@@ -94,10 +108,10 @@ def bearing_life(view: View) -> Answer:
     Returns
     -------
     Answer
-        Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``loads`` (see `load_rows`) and
+        Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``bearings`` (see `bearing_rows`) and
         ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Lives are in hours. Facts
-        ``symbol`` of the life, ``critical_amplitude`` (rad), ``used``, ``unrated``, ``short``, ``fretting`` and
-        ``load_error``, see `lives.Lives`.
+        ``symbol`` of the life, ``critical_amplitude`` (rad), ``used``, ``unrated``, ``short``, ``fretting``,
+        ``load_error`` and ``population`` (h), see `lives.Lives`.
 
     Raises
     ------
@@ -119,14 +133,16 @@ def bearing_life(view: View) -> Answer:
         parts.append(Table("lives", title, (bearing, *LIVES), reached, UNITS, by_share(reached, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, (bearing, *BELOW), below, {"required": "h"})] if below else []
-    loads, units = rating.load_rows(lives), {"nominal_load": "N", "load": "N"}
-    title = "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
-    parts.append(Table("loads", title, (bearing, *LOADS), loads, units, by_share(loads, "place")))
+    each = rating.bearing_rows(lives)
+    units = {f"{which}{name}": unit for name, unit in OF_BEARING.items() for which in ("", "nominal_")}
+    most = f"{100.0 * rating.SHARES[-1]:g} % of the joints"
+    title = f"Bearing by bearing, in {most}: P, tilt and pressure at most, life and C0/P0 at least"
+    parts.append(Table("bearings", title, (bearing, *BEARINGS), each, units, by_share(each, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         units = dict.fromkeys(list(contacts[0])[1:], "1")
         parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
-    names_of_facts = ("critical_amplitude", "used", "unrated", "short", "fretting", "load_error")
+    names_of_facts = ("critical_amplitude", "used", "unrated", "short", "fretting", "load_error", "population")
     facts: dict[str, Any] = {"symbol": lives.bearing.symbol} | {name: getattr(lives, name) for name in names_of_facts}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
@@ -252,7 +268,7 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
     """What the life means, what it leaves out, restrictions."""
     bearing = lives.bearing
     if lives.unrated < lives.valid:
-        ratings = " and ".join(dict.fromkeys(text.number(each.C / 1e3) for each in lives.bearings))
+        ratings = " and ".join(dict.fromkeys(text.number(each.dynamic_rating / 1e3) for each in lives.bearings))
         a_iso = {1.0 if each.a_iso is None else each.a_iso: each.a_iso for each in lives.bearings}
         modified = "" if list(a_iso.values()) == [None] else f", a_ISO = {' and '.join(f'{a:g}' for a in a_iso)}"
         factors = f"a_1 = {A1[bearing.reliability]:g}{modified}"
@@ -262,6 +278,11 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
             f"{ratings} kN, {factors}) at the joint's speed and misalignment; "
             f"all {all_pins}: until the first of the {all_pins} bearings fails, Weibull slope 9/8"
         )
+    if not math.isnan(lives.population):
+        yield (
+            f"{100.0 * (1.0 - bearing.reliability):.3g} % of all joints together have lost a bearing after "
+            f"{_hours(lives.population)}: life itself scatters, and loads do"
+        )
     if len(lives.duty) > 1:
         times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())
         yield f"over a duty cycle: {times} of the time; P: the constant load with the same life"
@@ -269,16 +290,22 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
             used = sorted(lives.used.items(), key=lambda of: -of[1])
             told = ", ".join(f"{text.percent(share)} at {point}" for point, share in used)
             yield f"share of the life of all bearings that each operating point uses up, mean of the joints: {told}"
-    edge = "the rating knows no edge load: it takes the resultant force as spread along the needles"
+    yield (
+        "P is by laminae (ISO/TS 16281): the load with the same L10r on the bearing in line and without clearance. "
+        "Pressure: of the most loaded lamina, without the stress at the ends of a needle"
+    )
+    laws = {joint.contact.law for joint in recorded.joints_at(lives.view.store, 0)} - {"needles"}
+    if laws:
+        yield (
+            f"the joints were simulated with contact.law = {' and '.join(sorted(laws))}: force and tilt of each pin "
+            "are distributed over the needles afterwards"
+        )
     if contacts:
         row = contacts[-1]
         yield (
-            f"{edge}. In {text.percent(row['one_end'])} of the joints at least one bearing is loaded at one end only "
-            f"for more than half of a revolution, in {text.percent(row['opposite_ends'])} at opposite ends, where the "
-            "resultant is smaller than the forces at the ends: these bearings last shorter than rated"
+            f"in {text.percent(row['one_end'])} of the joints at least one bearing is loaded at one end only for more "
+            f"than half of a revolution, in {text.percent(row['opposite_ends'])} at opposite ends"
         )
-    else:
-        yield f"{edge}; the study keeps no contact modes, which tell how many bearings have it"
     yield from _at_points(lives)
     if 0 < lives.unrated < lives.valid:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.rating_life import population_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
@@ -18,7 +19,7 @@ from tolstat.display import text
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing, joints_of
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.questions.bearing_life.rated import HOUR, rated, turning_of
+from tolstat.questions.bearing_life.rated import HOUR, largest, rated, turning_of
 from tolstat.questions.shares import inapplicable, unusable, with_ends
 from tolstat.store import recorded
 from tolstat.store.view import View
@@ -56,8 +57,12 @@ class Lives:
         Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
     hours : ndarray, shape (n, places)
         Life of each bearing and of several together, as in `places`, h; NaN without a result or without a rating.
+    worst : dict of str to ndarray, shape (n, pins)
+        What `rated.largest` tells of each bearing.
     nominal_loads, nominal_hours : ndarray, shape (pins,) and (places,)
         The same of the nominal joint; NaN if there is none.
+    nominal_worst : dict of str to ndarray, shape (pins,)
+        Likewise.
     short, fretting : dict of str to int
         Valid joints by operating point of which a bearing swings by less than ``bearing.critical_amplitude`` there, and
         by less than `rating_life.FRETTING` times this; only points that have any.
@@ -74,8 +79,10 @@ class Lives:
     pins: tuple[str, ...]
     loads: FloatArray
     hours: FloatArray
+    worst: Mapping[str, FloatArray]
     nominal_loads: FloatArray
     nominal_hours: FloatArray
+    nominal_worst: Mapping[str, FloatArray]
     short: Mapping[str, int]
     fretting: Mapping[str, int]
     unrated: int
@@ -95,7 +102,9 @@ class Lives:
         """Load rating C of the bearings of one of `places`, N; NaN of several with different ones."""
         joints = [name.rstrip(".") for name in prefixes(self.view.mechanism)]
         ratings = {
-            b.C for joint, b in zip(joints, self.bearings, strict=True) if place.startswith(joint) or place == SHAFT
+            b.dynamic_rating
+            for joint, b in zip(joints, self.bearings, strict=True)
+            if place.startswith(joint) or place == SHAFT
         }
         return ratings.pop() if len(ratings) == 1 else np.nan
 
@@ -120,6 +129,16 @@ class Lives:
         return self.view.count(*VALID)
 
     @property
+    def population(self) -> float:
+        """Life that a share `Bearing.reliability` of all joints reaches, their loads and lives scattering, h.
+
+        NaN where a joint has no life.
+        """
+        hours = self.hours[np.isin(self.view.status, VALID), -1]
+        limited = hours.size > 0 and bool(np.isfinite(hours).all())
+        return population_life(hours, self.bearing.reliability) if limited else np.nan
+
+    @property
     def required(self) -> float:
         """Required life, h; NaN if none is given."""
         return np.nan if self.bearing.required_life is None else self.bearing.required_life / HOUR
@@ -131,11 +150,15 @@ class Lives:
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
         return Sample.of(values, self.view.status, self.view.design, name=place, unit="1/h", nominal=nominal)
 
-    def load(self, pin: str) -> Sample:
-        """Dynamic equivalent load of a pin's bearing, N."""
-        k = self.pins.index(pin)
-        nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
-        return Sample.of(values, self.view.status, self.view.design, name=pin, unit="N", nominal=nominal)
+    def of_bearing(self, name: str, pin: str) -> Sample:
+        """A quantity of a pin's bearing: ``load``, N, or one of `worst`; of the safety the reciprocal."""
+        k, unit = self.pins.index(pin), {"load": "N", "tilt": "rad", "pressure": "Pa", "safety": "1"}[name]
+        nominal, values = self.nominal_loads[k], self.loads[:, k]
+        if name != "load":
+            nominal, values = self.nominal_worst[name][k], self.worst[name][:, k]
+        with np.errstate(divide="ignore"):
+            nominal, values = (1.0 / nominal, 1.0 / values) if name == "safety" else (nominal, values)
+        return Sample.of(values, self.view.status, self.view.design, name=pin, unit=unit, nominal=float(nominal))
 
 
 def places_of(mechanism: Mechanism) -> dict[str, str]:
@@ -172,7 +195,9 @@ def lives_of(view: View) -> Lives:
     view.check()
     bearings, duty, stores = _bearings(view), view.shares_of_time, [part.store for part in view.parts]
     pins = kinds(view.mechanism)["contact"].places
-    load, hours, used, small = rated(bearings, duty, [turning_of(store) for store in stores])
+    turning = [turning_of(store) for store in stores]
+    load, hours, used, small = rated(bearings, duty, turning)
+    worst = largest(bearings, turning)
     unrated = np.asarray(small[1].all(axis=0))
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
@@ -187,8 +212,10 @@ def lives_of(view: View) -> Lives:
         pins=pins,
         loads=load[skip:],
         hours=hours[skip:],
+        worst={name: values[skip:] for name, values in worst.items()},
         nominal_loads=load[0] if has_nominal else np.full(len(pins), np.nan),
         nominal_hours=hours[0] if has_nominal else np.full(hours.shape[1], np.nan),
+        nominal_worst={name: values[0] if has_nominal else np.nan * load[0] for name, values in worst.items()},
         short=short,
         fretting=fretting,
         unrated=int((unrated[skip:].any(axis=1) & valid).sum()),
@@ -221,14 +248,16 @@ def _bearings(view: View) -> tuple[Bearing, ...]:
 def _complete(view: View, bearing: Bearing | None, section: str) -> Bearing:
     """Bearing of the joint of a section of the study; refused without what a life needs."""
     again = "then repeat tolstat run: no joint is simulated again"
+    anew = "then run it into another file: loads are distributed over the needles as a joint is simulated"
     if bearing is None:
-        remedy = f"add the section [bearing] to the joint file or [{section}.bearing] to the study, {again}"
+        remedy = f"add the section [bearing] to the joint file or [{section}.bearing] to the study, {anew}"
         raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
         incomplete = f"holds needle bearings without {', '.join(lacking)}, which a rating life needs"
         error = inapplicable if bearing.C is None and bearing.required_life is None else unusable
         keys = " and ".join(f"{section}.bearing.{key}" for key in lacking)
-        raise error(view, incomplete, f"add {keys} to the study, or to [bearing] of the joint file, {again}")
+        then = again if lacking == ["C"] else anew
+        raise error(view, incomplete, f"add {keys} to the study, or to [bearing] of the joint file, {then}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(kinds(view.mechanism)["contact"].places):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)
@@ -284,19 +313,29 @@ def life_rows(lives: Lives) -> Rows:
     return rows
 
 
-def load_rows(lives: Lives) -> Rows:
-    """Dynamic equivalent load that a share of the joints stays at or below.
+def bearing_rows(lives: Lives) -> Rows:
+    """Each bearing by itself: what a share of the joints stays at or below; lives and static safeties that it reaches.
 
     Returns
     -------
     sequence of mapping
-        One row per bearing and share: ``place``, ``share``, ``nominal_load`` and ``load``, N.
+        One row per bearing and share: ``place``, ``share``, ``load`` (P, N), ``tilt`` (rad), ``life`` (h), ``safety``
+        (C0/P0), ``pressure`` (Pa), and ``nominal_`` each; NaN where it is not known.
     """
-    return [
-        {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
-        for pin, load in zip(lives.pins, map(lives.load, lives.pins), strict=True)
-        for share in SHARES
-    ]
+    rows = []
+    for pin in lives.pins:
+        of = {name: lives.of_bearing(name, pin) for name in ("load", "tilt", "safety", "pressure")}
+        of["life"] = lives.rate(pin)
+        for share in SHARES:
+            row: dict[str, Any] = {"place": pin, "share": share}
+            for name, sample in of.items():
+                found = (sample.quantile(share).estimate, sample.nominal)
+                inverse = name in ("safety", "life")
+                row |= dict(
+                    zip((name, f"nominal_{name}"), (1.0 / x if inverse and x else x for x in found), strict=True)
+                )
+            rows.append(row)
+    return rows
 
 
 def below_rows(lives: Lives) -> Rows:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import rating_life
+from tolstat.common.load_kinds import RESULTANT
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT
 from tolstat.joint import Bearing
@@ -17,14 +18,36 @@ from tolstat.store import Reader, recorded
 HOUR = 3600.0
 
 
+OF_BEARINGS = ("equivalent_load", "tilt", "line_load", "contact_max")
+"""Fields of the results on bearings."""
+
+
 def turning_of(store: Reader) -> dict[str, FloatArray]:
-    """Equivalent load of each bearing (n, pins), ``omega`` (n,), of Cardan joints ``alpha`` (n, joints), of a file."""
+    """Fields `OF_BEARINGS` (n, pins, ...), ``omega`` (n,), of Cardan joints ``alpha`` (n, joints), of a file."""
     operation = recorded.operating_points(store)
     alpha = [operation["alpha"]] if "alpha" in operation else []
     if store.mechanism.is_shaft:
         alpha.append(store.operation.alphas[1] + store.errors(slice(None), ("shaft.alpha",))["shaft.alpha"])
-    loads = store.results(slice(None), ("equivalent_load",))["equivalent_load"]
-    return {"equivalent_load": loads, "omega": operation["speed"], "alpha": np.transpose(alpha)}
+    results = store.results(slice(None), OF_BEARINGS)
+    of_bearings = {name: results[name] for name in OF_BEARINGS}
+    return of_bearings | {"omega": operation["speed"], "alpha": np.transpose(alpha)}
+
+
+def largest(bearings: Sequence[Bearing], turning: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+    """Largest ``tilt`` (rad) and ``pressure`` (Pa), and static ``safety`` C0/P0, over the operating points, (n, pins).
+
+    The pressure is Hertz's of the most loaded lamina on the pin, without the stress at the ends of a needle (ISO/TS
+    16281:2008). P0 is the largest resultant force (ISO 76).
+    """
+    tilt, line = (np.max([each[name] for each in turning], axis=0) for name in ("tilt", "line_load"))
+    force = np.max([each["contact_max"][:, :, RESULTANT] for each in turning], axis=0)
+    pins = force.shape[1] // len(bearings)
+    C0, D, d = (
+        np.repeat(values, pins)
+        for values in np.transpose([(b.static_rating, b.needle_diameter, b.pitch_diameter) for b in bearings])
+    )
+    with np.errstate(divide="ignore"):
+        return {"tilt": tilt, "pressure": rating_life.line_pressure(line, D, d - D), "safety": C0 / force}
 
 
 class Rated(NamedTuple):
@@ -68,7 +91,7 @@ def rated(bearings: Sequence[Bearing], duty: FloatArray, turning: Sequence[Mappi
     swings = np.repeat(joints, pins, axis=2)
     critical, factor, C = (
         np.repeat(np.array([getattr(bearing, name) for bearing in bearings], float), pins)
-        for name in ("critical_amplitude", "factor", "C")
+        for name in ("critical_amplitude", "factor", "dynamic_rating")
     )
     hourly = duty[:, None, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)

@@ -55,13 +55,13 @@ def plain(*commands: str) -> list[str]:
 
 
 def usual(file: str, kind: str = "") -> dict[str, list[str]]:
-    """Commands that are asked of every campaign; `kind` stands before those that show many digits of small numbers."""
+    """Commands that are asked of every campaign; `kind` stands before those that show loads or numerical errors."""
     return {
         "status": plain(f"status {file}"),
-        "report": [f"report {file} --wide --accept '5 %' --out wide"],
-        "page": [f"report {file} --out page.html --accept '10 %' --replay 20"],
-        "capability": forms(f"capability {file}"),
-        "worst": forms(f"worst {file} --top 4"),
+        "report": [f"{kind}report {file} --wide --accept '5 %' --out wide"],
+        "page": [f"{kind}report {file} --out page.html --accept '10 %' --replay 20"],
+        "capability": forms(f"{kind}capability {file}"),
+        "worst": forms(f"{kind}worst {file} --top 4"),
         "orders": forms(f"{kind}orders {file}"),
         "export": [f"{kind}export {file} --csv - --nominal", f"{kind}export {file} --statistics statistics.json"],
     }

@@ -18,7 +18,7 @@ def cheap(*studies: str) -> str:
 SWEEP = Campaign(
     "clearance", ["run clearance.toml"], usual("clearance.h5", ROUGH) | {"show": ["show clearance.h5 --row 2"]}
 )
-BORED = Campaign("line_bored", ["run line_bored.toml --n 48"], usual("line_bored.h5"))
+BORED = Campaign("line_bored", ["rough: run line_bored.toml --n 48"], usual("line_bored.h5", ROUGH))
 OVERNIGHT = Campaign("overnight", ["run overnight.toml --n 64"], usual("overnight.h5"))
 RATTLE = Campaign("rattle", ["run rattle.toml --n 12"], usual("rattle.h5"))
 FUZZ = Campaign(
@@ -157,7 +157,7 @@ FOURBAR = Campaign(
     ["run four_bar.toml --n 24"],
     {
         "show": ["show four_bar.toml"],
-        "page": ["report four_bar.h5 --out page.html --accept '30 %' --replay 20"],
+        "page": [f"{ROUGH}report four_bar.h5 --out page.html --accept '30 %' --replay 20"],
         "worst": ["worst four_bar.h5 --top 3"],
     },
 )
@@ -166,7 +166,7 @@ CRANKS = Campaign(
     ["run parallel_cranks.toml --n 24"],
     {
         "plan": ["plan parallel_cranks.toml --pilot 4"],
-        "report": ["report parallel_cranks.h5 --wide --accept '30 %'"],
+        "report": [f"{ROUGH}report parallel_cranks.h5 --wide --accept '30 %'"],
         "orders": [f"{ROUGH}orders parallel_cranks.h5"],
     },
 )

@@ -12,9 +12,9 @@ from typing import Any
 DIGITS = 9
 CLOSE, ROUGH = ", numbers", ", rough numbers"
 """At the end of the head of a block whose numbers are compared with a tolerance."""
-TOLERANCES = {CLOSE: (1e-6, 1e-12), ROUGH: (0.1, 1e-9)}
-"""Relative and absolute: processors differ in the last bits of a result, which differences amplify, and numbers are told
-with two digits: 1.65e-5 by 6 % apart."""
+TOLERANCES = {CLOSE: (1e-6, 1e-12), ROUGH: (0.1, 2e-6)}
+"""Relative and absolute: processors differ in the last bits of a result, which differences amplify: numerical errors of
+1e-6 by half. Numbers are told with two digits: 1.65e-5 by 6 % apart."""
 LINE, LONG = 110, 200
 """Longest line of a list or table, characters; most lines of a document."""
 FEW, HEAD = 24, 2

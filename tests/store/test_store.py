@@ -274,6 +274,21 @@ def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
     assert answer.startswith(f"{path}: is being written by another process\n  hint: ")
 
 
+def test_a_file_that_another_program_keeps_open_is_told(
+    tmp_path: Path, study: fakes.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On Windows a program may open a file so that no other can; here the system's error is made."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    new_store(tmp_path / "a.h5", study).close()
+    monkeypatch.setattr(h5py, "File", refused)
+    with pytest.raises(StoreError, match=r"a\.h5: is open in another program\n  hint: close it there"):
+        Writer.open(tmp_path / "a.h5")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
+
+
 def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
     path.write_text("precious")

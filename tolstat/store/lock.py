@@ -51,7 +51,7 @@ def is_locked(path: Path) -> bool:
             filelock.FileLock(beside).acquire(timeout=0).lock.release()
     except filelock.Timeout:
         return True
-    except OSError:  # a lock of somebody else, who may have been killed
+    except (OSError, NotImplementedError):  # a lock of somebody else, who may have been killed
         pass
     return False
 

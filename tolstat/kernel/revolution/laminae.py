@@ -53,8 +53,16 @@ def root(delta, fit):
 def press_needles(r, along, across, clearance, kind, par, work):
     """Force on a pin (N), its slope by r (N/m), damage, and largest approach of a needle (m).
 
-    The damage is the sum over the laminae of that of both rings, in proportion to L10r^(-9/8), eq. (65). `work`, (5,
-    LAMINAE), is scratch: without sums, and without branches, the loop over the laminae is compiled to SIMD.
+    The damage is the sum over the laminae of that of both rings, in proportion to L10r^(-9/8), eq. (65).
+
+    Parameters
+    ----------
+    r, along, across : float
+        Displacement of the pin's middle, m; what a needle's end is displaced beyond it, along and across it, m.
+    clearance, kind, par
+        As in `lamina_load`.
+    work : ndarray, shape (5, LAMINAE)
+        Scratch: without sums and branches the loop over the laminae is compiled to SIMD.
     """
     fit, along_pin, worn = fit_of(OF_POWER, kind, par), fit_of(OF_FORCE, kind, par), fit_of(OF_DAMAGE, kind, par)
     for lamina in range(LAMINAE):
@@ -83,7 +91,14 @@ def press_needles(r, along, across, clearance, kind, par, work):
 def displaced(force, start, along, across, clearance, kind, par, work):
     """Displacement r, m, at which needles carry a force, and what `press_needles` returns there; Newton's iteration.
 
-    The force rises with r, and so does its slope. `start`: a first r, m.
+    The force rises with r, and so does its slope.
+
+    Parameters
+    ----------
+    force, start : float
+        The force, N; a first r, m.
+    along, across, clearance, kind, par, work
+        As in `press_needles`.
     """
     r, low, high = start, 0.0, math.inf
     found = press_needles(r, along, across, clearance, kind, par, work)

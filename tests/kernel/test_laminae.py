@@ -34,7 +34,7 @@ def made(factor=1.0, **keys):
 def load(par, force, end=0.0, turn=0.0, clearance=0.0, start=2e-5):
     """Equivalent load, N, and line load, N/mm; lengths in mm."""
     ends = (start, 1e-3 * end * np.cos(turn), 1e-3 * end * np.sin(turn))
-    equivalent, line, _ = lamina_load(force, ends, 0.0, 1e-3 * clearance, 0, par, np.empty((5, LAMINAE)))
+    equivalent, line, _ = lamina_load(force, ends, 0.0, 1e-3 * clearance, 0, par, np.empty((6, LAMINAE)))
     return equivalent, 1e-3 * line
 
 

@@ -55,7 +55,7 @@ def tilt_of(pin, ends, par):
 def write_equivalent_loads(par, samples, out):
     """Write equivalent load, largest tilt and largest line load of each pin's bearing to a row of KERNEL_RESULT."""
     n, pins = samples.size, out.equivalent_load.shape[0]
-    more, work = np.zeros(pins), np.empty((5, LAMINAE))
+    more, work = np.zeros(pins), np.empty((6, LAMINAE))
     for first in range(0, pins, PINS_OF_JOINT):
         whole_output = whole_input = 0.0
         last, known = min(first + PINS_OF_JOINT, pins), par.needle_k[par.pair_kind[first]] > 0

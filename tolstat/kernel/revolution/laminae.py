@@ -21,13 +21,13 @@ from tolstat.common.parameters import (
 )
 from tolstat.kernel.simd.jit import njit
 
-CLOSE = 0.003
-"""Relative error of force or damage up to which a displacement is a solution."""
+CLOSE = 0.01
+"""Relative error of the force up to which the rest of Newton's iteration is one step along the slopes."""
 TRIES = 40
 """Maximum number of displacements that are tried."""
 NOTHING = 1e-12
 """Approach of a lamina without load, m."""
-FORCE, SLOPE, DAMAGE, DEEPEST = range(4)
+FORCE, SLOPE, DAMAGE, RISE, DEEPEST = range(5)
 
 
 @njit
@@ -51,10 +51,18 @@ def root(delta, fit):
 
 @njit
 def press_needles(r, along, across, clearance, kind, par, work):
-    """Force on a pin (N), its slope by r (N/m), damage, and largest approach of a needle (m).
+    """Force on a pin (N) and damage, each with its slope by r, and largest approach of a needle (m).
 
-    The damage is the sum over the laminae of that of both rings, in proportion to L10r^(-9/8), eq. (65). `work`, (5,
-    LAMINAE), is scratch: without sums, and without branches, the loop over the laminae is compiled to SIMD.
+    The damage is the sum over the laminae of that of both rings, in proportion to L10r^(-9/8), eq. (65).
+
+    Parameters
+    ----------
+    r, along, across : float
+        Displacement of the pin's middle, m; what a needle's end is displaced beyond it, along and across it, m.
+    clearance, kind, par
+        As in `lamina_load`.
+    work : ndarray, shape (6, LAMINAE)
+        Scratch: without sums and branches the loop over the laminae is compiled to SIMD.
     """
     fit, along_pin, worn = fit_of(OF_POWER, kind, par), fit_of(OF_FORCE, kind, par), fit_of(OF_DAMAGE, kind, par)
     for lamina in range(LAMINAE):
@@ -68,22 +76,30 @@ def press_needles(r, along, across, clearance, kind, par, work):
         secant = v * root(delta, fit) * polynomial(along_pin, u)
         force, square = delta * secant, delta * delta
         rising = (10 / 9 + 0.5 * (1 - u)) * cosine * cosine + u * sine * sine  # more needles are loaded, too
-        damage = v * polynomial(worn, v)
+        damage = par.lamina[kind, EDGES, lamina] * square * square * v * polynomial(worn, v)
         work[0, lamina], work[1, lamina], work[2, lamina] = force * cosine, force * sine, secant * rising
-        work[3, lamina], work[4, lamina] = par.lamina[kind, EDGES, lamina] * square * square * delta * damage, delta
-    force = aside = slope = damage = deepest = 0.0
+        work[3, lamina], work[4, lamina] = damage * delta, damage * (5 + 0.5 * (1 - u)) * cosine
+        work[5, lamina] = delta
+    force = aside = slope = damage = rise = deepest = 0.0
     for lamina in range(LAMINAE):
         force, aside, slope = force + work[0, lamina], aside + work[1, lamina], slope + work[2, lamina]
-        damage, deepest = damage + work[3, lamina], max(deepest, work[4, lamina])
+        damage, rise, deepest = damage + work[3, lamina], rise + work[4, lamina], max(deepest, work[5, lamina])
     k = par.needle_k[kind] * par.needles[kind] / LAMINAE
-    return k * math.sqrt(force * force + aside * aside), k * slope, damage, deepest
+    return k * math.sqrt(force * force + aside * aside), k * slope, damage, rise, deepest
 
 
 @njit
 def displaced(force, start, along, across, clearance, kind, par, work):
     """Displacement r, m, at which needles carry a force, and what `press_needles` returns there; Newton's iteration.
 
-    The force rises with r, and so does its slope. `start`: a first r, m.
+    The force rises with r, and so does its slope.
+
+    Parameters
+    ----------
+    force, start : float
+        The force, N; a first r, m.
+    along, across, clearance, kind, par, work
+        As in `press_needles`.
     """
     r, low, high = start, 0.0, math.inf
     found = press_needles(r, along, across, clearance, kind, par, work)
@@ -125,7 +141,7 @@ def lamina_load(force, ends, before, clearance, kind, par, work):
         By how much needles were displaced more than the contact law has it, at the sample before, m.
     clearance, kind, par
         Radial clearance, m; kind of the pair; the joint.
-    work : ndarray, shape (5, LAMINAE)
+    work : ndarray, shape (6, LAMINAE)
         Scratch.
 
     Returns
@@ -136,7 +152,7 @@ def lamina_load(force, ends, before, clearance, kind, par, work):
     if not (force > 0 and ends[0] >= 0):
         return force, 0.0 if force == 0 else math.nan, before
     r, found = displaced(force, max(ends[0] + before, 0.0), ends[1], ends[2], clearance, kind, par, work)
-    off = force / found[FORCE]
-    deepest = found[DEEPEST]
-    line = off * par.needle_k[kind] * deepest * root(deepest, fit_of(OF_POWER, kind, par)) / (2 * par.needle_half[kind])
-    return off * in_line(found[DAMAGE], kind, par), line, r - ends[0]
+    rest = (force - found[FORCE]) / found[SLOPE]
+    deepest = found[DEEPEST] + rest
+    line = par.needle_k[kind] * deepest * root(deepest, fit_of(OF_POWER, kind, par)) / (2 * par.needle_half[kind])
+    return in_line(found[DAMAGE] + rest * found[RISE], kind, par), line, r + rest - ends[0]

@@ -179,6 +179,17 @@ def test_damage_by_joint_follows_from_a_netcdf_file(duty_cycle, tmp_path):
     assert expected.attrs["units"]["cross1.F_t m=4"] == "N"
 
 
+def test_joints_with_the_largest_damage_and_what_causes_it(duty_cycle):
+    with tolstat.open(duty_cycle) as store:
+        view = store.view()
+        rows = tolstat.worst(view, "damage cross1.F_t", top=2).frame("joints")
+        expected = tolstat.fatigue_by_joint(view, ["cross1.F_t"])["damage cross1.F_t"].nlargest(2)
+        with pytest.raises(tolstat.InputError, match="has no S-N line"):
+            tolstat.worst(view, "damage cross1.F_e")
+    assert rows["row"].tolist() == expected.index.tolist()
+    np.testing.assert_allclose(rows["value"], expected)
+
+
 @pytest.mark.slow  # mypy reads the whole package
 def test_mypy_knows_the_types_of_a_users_script(tmp_path):
     pytest.importorskip("mypy")

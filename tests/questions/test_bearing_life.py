@@ -20,6 +20,7 @@ from tolstat.common.tables import Mode, Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence, Table
 from tolstat.joint import Operation
+from tolstat.questions import quantity
 from tolstat.questions.bearing_life import answer as question
 from tolstat.questions.bearing_life.lives import LOADED, below_rows, lives_of
 from tolstat.store.recorded import operating_points
@@ -453,3 +454,13 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
         assert store.created == created
     np.testing.assert_allclose(second.hours, 2 ** (10 / 3) * first.hours)
     assert np.isfinite(second.hours[:, : len(CARDAN.pairs)]).all()
+
+
+def test_what_shortens_a_life_is_asked_as_of_a_load():
+    made = view()
+    found = quantity(made, "life pin2")
+    np.testing.assert_allclose(1.0 / found.values, lives_of(made).hours[:, lives_of(made).places.index("pin2")])
+    assert (found.name, found.unit) == ("1/life of pin2", "1/h")
+    assert quantity(made, "life").name == "1/life"
+    with pytest.raises(InputError, match="is not the life of a bearing"):
+        quantity(made, "life pin9")

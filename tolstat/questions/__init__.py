@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tolstat.common.errors import StoreError, input_error
 
 if TYPE_CHECKING:
+    from tolstat.analysis.sample import Sample
     from tolstat.display.answer import Answer, Asked
     from tolstat.store.view import View
 
@@ -124,6 +125,25 @@ QUESTIONS = (
 
 PUBLIC = {question.name: f"tolstat.questions.{question.file or question.name}" for question in QUESTIONS}
 """Public names, and the modules that they come from."""
+
+
+COMPUTED = {"life": "bearing_life.lives", "damage": "fatigue.by_joint"}
+"""First word of what a question computes of each joint, and its module, whose `quantity` gives it."""
+
+
+def is_computed(name: str) -> bool:
+    """Whether a name is that of a quantity which a question computes: ``life pin1``, ``damage cross1.F_t``."""
+    return name.partition(" ")[0] in COMPUTED
+
+
+def quantity(view: View, name: str) -> Sample:
+    """Load of each joint by its name, or what a question computes of it; raises as `View.load` and the question."""
+    if not is_computed(name):
+        return view.load(name)
+    word, _, rest = name.partition(" ")
+    module = import_module(f"tolstat.questions.{COMPUTED[word]}")
+    found: Sample = view.kept(("quantity", name), lambda: module.quantity(view, rest))
+    return found
 
 
 def statistics(view: View) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,11 @@ import numpy as np
 from tolstat.analysis import accuracy
 from tolstat.analysis.rating_life import population_life
 from tolstat.analysis.sample import Sample, total_interval
+from tolstat.common.errors import input_error
 from tolstat.common.load_kinds import kinds
 from tolstat.common.loads import FloatArray
 from tolstat.common.mechanism import Mechanism, prefixes
+from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display import text
 from tolstat.display.table import Rows
@@ -221,6 +223,15 @@ def lives_of(view: View) -> Lives:
         unrated=int((unrated[skip:].any(axis=1) & valid).sum()),
         load_error=_load_error(view),
     )
+
+
+def quantity(view: View, place: str) -> Sample:
+    """Reciprocal of the life of one of `places_of`, 1/h; of all bearings together without a place."""
+    lives = lives_of(view)
+    place = place or lives.whole
+    if place not in lives.places:
+        raise input_error(f"life {place}", "is not the life of a bearing", did_you_mean(place, list(lives.places)))
+    return replace(lives.rate(place), name="1/life" if place == lives.whole else f"1/life of {place}")
 
 
 def _mean(shares: FloatArray) -> FloatArray:

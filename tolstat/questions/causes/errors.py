@@ -22,7 +22,7 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
-from tolstat.questions import shares
+from tolstat.questions import is_computed, quantity, shares
 from tolstat.questions.causes import lines, revolution
 from tolstat.questions.causes.shares import ENDS, check_scatter
 from tolstat.questions.causes.simulation import simulate as simulate
@@ -103,7 +103,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     view : View
         A campaign whose joints are drawn from tolerances.
     by : str, optional
-        Load, such as cross1.F or psi, or "any limit"; default: all limits, or the only one.
+        Load, such as cross1.F or psi, "any limit", or over the duty cycle "life", "life pin1" or "damage cross1.F_t";
+        default: all limits, or the only one.
     top : int
         Number of errors in the printed table.
     logarithm : bool
@@ -135,19 +136,19 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     load = by or view.decisive
     of_errors = indices(view, load, logarithm)
     facts, parts = of_errors.facts, list[Part]()
-    command = f"tolstat causes {quote(str(view.path))} --run"
+    command = "" if is_computed(load) else f"tolstat causes {quote(str(view.path))} --run"
     if costs is not None and not view.altered:
         missing = f"is about changes of lines, and {view.path} holds no joints with one"
-        raise InputError([Fault("--costs", missing, f"simulate them: {command}")])
-    if view.altered:
+        raise InputError([Fault("--costs", missing, f"simulate them: {command}" if command else "leave it out")])
+    if view.altered and not is_computed(load):
         with suppress(NotApplicable):  # joints of other lines, or at other operating points
             changed = lines.lines(view, load, costs=costs)
             parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
-    else:
+    elif command and not view.altered:
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
     parts += map(Sentence, _notes(of_errors, "" if view.altered else command, top))
-    followed, m = revolution.followed(view, [load]), view.mechanism
+    followed, m = [] if is_computed(load) else revolution.followed(view, [load]), view.mechanism
     stored = [name for name in followed if held(view.store, histories_of([name], m))]
     parts += revolution.over_angle(view, stored)
     return Answer("causes", "Causes by error", parts, facts)
@@ -292,7 +293,7 @@ def indices(view: View, by: str, logarithm: bool = False, joints: int | None = N
     """
     view.check_drawn()
     view.check()
-    load = view.load(by)
+    load = quantity(view, by)
     if joints is not None:
         load = load.only(np.arange(min(joints, view.n)))
     names, parts, variance = _of_samples(view, load, logarithm)

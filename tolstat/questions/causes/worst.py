@@ -19,6 +19,7 @@ from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, VALID, Status
 from tolstat.display.answer import Answer, Asked, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Load, Top
+from tolstat.questions import is_computed, quantity
 from tolstat.questions.shares import rows_of, value, word
 from tolstat.store.view import View
 
@@ -54,7 +55,8 @@ def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
     view : View
         A campaign.
     by : str, optional
-        Load, such as cross1.F or psi, or a column of the results; by default the one whose limit most joints exceed.
+        Load, such as cross1.F or psi, a column of the results, or over the duty cycle "life", "life pin1" or
+        "damage cross1.F_t"; by default the load whose limit most joints exceed.
     top : int
         Number of joints to list.
 
@@ -92,7 +94,8 @@ def _answer(view: View, loads: Sequence[str], n: int) -> Answer:
     )
     parts: list[Part] = [Table("joints", f"Joints with the largest {', '.join(loads)}", columns, rows)]
     if rows:
-        at = f" --point {quote(rows[0]['point'])}" if rows[0]["point"] else ""
+        point = rows[0]["point"] or view.points[0]
+        at = f" --point {quote(point)}" if point else ""
         command = f"tolstat replay {quote(str(view.path))} --row {rows[0]['row']}{at}"
         if ordered(rows[0]):
             parts.append(Sentence(NOTES[any(row["raised_by"] for row in rows)]))
@@ -130,16 +133,17 @@ def joint_rows(view: View, by: str, n: int = 10) -> Rows:
         When the study is not that of the file.
     """
     samples, values, unit = _largest(view, by, n)
-    narrowed, name = view.narrowed(by)
-    points = [narrowed.points[0]] * len(samples)
-    if len(narrowed.parts) > 1:  # a load, whose largest value is at one of them
+    narrowed, name = _narrowed(view, by)
+    points = ["" if is_computed(by) else narrowed.points[0]] * len(samples)
+    if len(narrowed.parts) > 1 and not is_computed(by):  # a load, whose largest value is at one of them
         each = np.stack([load_of(name, view.mechanism).of(part.results)[samples] for part in narrowed.parts])
         points = [narrowed.points[k] for k in np.argmax(each, axis=0)]
     columns = {"row": view.rows(samples).tolist(), "value": values.tolist(), "point": points}
     columns["status"] = [Status(status).label for status in view.status[samples]]
     scores = _scores(view, samples)
     columns["raised_by"] = [", ".join(names) for names in _raising(narrowed, name, samples, scores)]
-    return [{"load": by, "unit": unit} | row for row in rows_of(columns | scores)]
+    told = quantity(view, by).name if is_computed(by) else by
+    return [{"load": told, "unit": unit} | row for row in rows_of(columns | scores)]
 
 
 def ordered(row: Row) -> list[tuple[str, float]]:
@@ -181,15 +185,23 @@ def _raising(
 
 def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray, str]:
     """Samples of the `n` joints with the largest values, the largest first; these values, and their unit."""
-    samples, values, unit = _with_values(*view.narrowed(by))
+    samples, values, unit = _with_values(*_narrowed(view, by))
     samples = samples[np.argsort(-values[samples], kind="stable")][:n]
     return samples, values[samples], unit
+
+
+def _narrowed(view: View, by: str) -> tuple[View, str]:
+    """View of the points that a load names, and its plain name; what a question computes is of the duty cycle."""
+    return (view, by) if is_computed(by) else view.narrowed(by)
 
 
 def _with_values(view: View, name: str) -> tuple[NDArray[np.intp], FloatArray, str]:
     """Samples of the joints that have a value, the values of all joints, and their unit."""
     columns = {column.name: column for column in view.columns}
-    if name in view.kept_loads:
+    if is_computed(name):
+        computed = quantity(view, name)
+        values, unit = computed.values, computed.unit
+    elif name in view.kept_loads:
         load = load_of(name, view.mechanism)
         values, unit = load.of(view.results), load.unit
     elif name in columns:

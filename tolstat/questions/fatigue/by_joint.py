@@ -7,12 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from tolstat.analysis import cycles, strength
+from tolstat.analysis.sample import Sample
 from tolstat.common.channels import unit_of
+from tolstat.common.errors import input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.loads import FloatArray
+from tolstat.common.strict import did_you_mean
+from tolstat.questions.fatigue.counting import settings_of
 from tolstat.questions.fatigue.loads import damage_sums, load_cycles
 from tolstat.questions.fatigue.parts import evaluated, load_stresses
 from tolstat.store.view import View
+
+
+def quantity(view: View, name: str) -> Sample:
+    """Damage sum of each joint in the service life, by the name of a load with an S-N line or of a point of a part."""
+    lines, points = settings_of(view).lines, settings_of(view).points
+    frame = fatigue_by_joint(view, [name] if name in lines else list(lines)[:1] or None)
+    column = f"damage {name}"
+    if column not in frame:
+        known = [*lines, *(point.name for point in points)]
+        remedy = did_you_mean(name, known) if known else "give the study S-N lines, see [fatigue]"
+        raise input_error(column, "has no S-N line", remedy)
+    return Sample.of(frame[column].to_numpy(), view.status, view.design, name=column, unit="1")
 
 
 def fatigue_by_joint(view: View, names: Sequence[str] | None = None) -> pd.DataFrame:

@@ -190,7 +190,7 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert made.wilks == {0.95: 59, 0.99: 299, 0.999: 2995}
     lower, upper = binomial.clopper_pearson(6, 60)
     assert made.widths[0.1] == upper - lower
-    campaign.run(small, tmp_path / "a.h5", 1, check=False)
+    campaign.run(small, tmp_path / "a.h5", 1)
     assert made.file_bytes == pytest.approx((tmp_path / "a.h5").stat().st_size, rel=0.05)
     with ResultFile.open(tmp_path / "a.h5") as store:
         results = store.results()[1:]

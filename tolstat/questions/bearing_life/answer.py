@@ -136,7 +136,7 @@ def bearing_life(view: View) -> Answer:
     each = rating.bearing_rows(lives)
     units = {f"{which}{name}": unit for name, unit in OF_BEARING.items() for which in ("", "nominal_")}
     most = f"{100.0 * rating.SHARES[-1]:g} % of the joints"
-    title = f"Bearing by bearing, in {most}: P, tilt and pressure at most, life and C0/P0 at least"
+    title = f"Bearings in {most}: P, tilt, pressure at most; life, C0/P0 at least"
     parts.append(Table("bearings", title, (bearing, *BEARINGS), each, units, by_share(each, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"

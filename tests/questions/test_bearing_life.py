@@ -255,7 +255,7 @@ def test_below_half_the_critical_amplitude_there_is_no_rating(alpha):
     assert said(made)[0].startswith("No rating: every joint swings by less than 6.22 deg")
     titles = [part.title for part in tolstat.bearing_life(made).parts if isinstance(part, Table)]
     assert not any("L10" in title or "reach" in title for title in titles)
-    assert any(title.startswith("Bearing by bearing") for title in titles)
+    assert any(title.startswith("Bearings in 99 %") for title in titles)
 
 
 def test_some_joints_without_a_rating():
@@ -428,10 +428,14 @@ def test_each_bearing_by_itself():
     assert table.loc["pin2", 0.99].nominal_tilt == 1e-3
 
 
-def test_without_the_length_of_needles_there_is_no_static_safety():
-    table = tolstat.bearing_life(views.view(joint=held(C0=None))).frame("bearings")
-    assert np.isnan(table["safety"]).all()
-    assert np.isfinite(table["pressure"]).all()
+def test_needles_are_as_long_as_the_contact_unless_their_length_is_given():
+    length = f"{1e3 * joint.load('cirelli2021', {}, 'x').contact.z} mm"
+    left_out, given = (
+        tolstat.bearing_life(views.view(joint=held(C=None, C0=None, needle_length=own))).frame("bearings")
+        for own in (None, length)
+    )
+    pd.testing.assert_frame_equal(left_out, given)
+    assert np.isfinite(left_out["safety"]).all()
 
 
 @pytest.mark.slow

@@ -43,13 +43,20 @@ READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 SIGNALS = tuple(number for number in signal.Signals if number.name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"))
 """Signals of this system that end a campaign. Workers ignore them: their parent decides when to stop."""
 HINT = "hint: if memory is short, use fewer workers: --workers 1"
-UNGUARDED = 'a worker runs the script once more\n  hint: start the campaign under: if __name__ == "__main__":'
+UNGUARDED = (
+    "each worker process runs the script, which would start the campaign again\n"
+    '  hint: start the campaign under: if __name__ == "__main__":'
+)
 SCRIPT = 113
 """Exit code of a worker that began the script of its user anew."""
 
 
 class WorkerDied(TolstatError):
     """Worker processes die whichever block they work on; finished results have been yielded before."""
+
+
+class Unguarded(WorkerDied):
+    """Worker processes cannot start, because the script of the user starts a campaign wherever it runs."""
 
 
 class Lost(NamedTuple):
@@ -185,7 +192,7 @@ class _Worker(Generic[BlockT]):
             self.process.join(1.0)
             code = self.process.exitcode or 0
             if code == SCRIPT and not self.ready:
-                raise WorkerDied(UNGUARDED) from None
+                raise Unguarded(UNGUARDED) from None
             return DIED, f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         return message
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -220,6 +220,9 @@ class Replay(NamedTuple):
     differences: list[Difference]
     code: list[str]
 
+    def __repr__(self) -> str:
+        return f"<row {self.row}, simulated again: {len(self.differences)} values differ from those stored>"
+
 
 def replay(source: str | Path | Reader, row: int, point: str = "") -> Replay:
     """Simulate a joint of a campaign again and compare with the stored results.
@@ -259,8 +262,8 @@ def histories(source: str | Path | Reader, rows: Sequence[int], point: str = "")
     Returns
     -------
     xarray.DataArray, (rows, theta, channels)
-        Columns of `CaseResult.to_pandas`; coordinates ``row``, ``theta`` (rad) and ``channel``. All rows need the same
-        number of steps per revolution.
+        Columns of `CaseResult.to_pandas`, SI; coordinates ``row``, ``theta`` (rad) and ``channel``. All rows need the
+        same number of steps per revolution.
 
     Raises
     ------
@@ -271,6 +274,8 @@ def histories(source: str | Path | Reader, rows: Sequence[int], point: str = "")
         import xarray
     except ImportError as error:
         raise input_error("histories", "xarray is not installed", "install it with: pip install xarray") from error
+    if not isinstance(rows, Iterable) or not len(rows := list(rows)):
+        raise input_error("rows", f"{rows!r} are no rows", "give a list of them, such as [17, 45]")
     with viewed(source) as view:
         frames = [_again(view.at(point).store, row).result.to_pandas().set_index("theta") for row in rows]
     coords = {"row": list(rows), "theta": frames[0].index.to_numpy(), "channel": list(frames[0].columns)}

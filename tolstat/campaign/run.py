@@ -18,7 +18,7 @@ from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.extend import extend as with_more
-from tolstat.campaign.pool import SIGNALS, WorkerDied, end_second_script, kept_workers
+from tolstat.campaign.pool import SIGNALS, Unguarded, WorkerDied, end_second_script, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
@@ -214,6 +214,8 @@ def run(
             store.finish()
         except KeyboardInterrupt:
             raise Interrupted(path, store.counts(), stop.number) from None
+        except Unguarded:
+            raise
         except WorkerDied as error:
             reached = store.counts()
             kept = f"{path} holds the results of {reached.done} of {reached.total} joints"

@@ -189,6 +189,9 @@ class Joint(Strict):
             found = "needles of {bearing.needle_length} reach past the joint centre"
             remedy = "give bearing.needle_length < 2 cross.R, where cross.R = {cross.R}"
             raise refuse(found, remedy, "bearing.needle_length", "cross.R")
+        if value is not None and value.needle_length is None:
+            value = value.model_copy(update={"needle_length": contact.z})
+            value.model_fields_set.discard("needle_length")  # it follows from the contact
         return value
 
     def warnings(self) -> list[Fault]:

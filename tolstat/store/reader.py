@@ -328,7 +328,7 @@ class Reader:
         """
         if name not in self.history_specs:
             kinds = ", ".join(self.history_specs) or "none"
-            remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
+            remedy = f'write histories = "full", "harmonics" or "cycles" in [output] of the study, and {RUN_AGAIN}'
             raise store_error(self.path, f"holds no histories {name!r} (it holds: {kinds})", remedy)
         slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
         values = self.history_specs[name].blank(len(slots))

@@ -162,7 +162,13 @@ class ResultFile(Reader):
             return {}
         known = recorded.operating_points(self.each()[0], slice(0, 1))
         values = {
-            f"point_{c.name}": ([float(getattr(point.operation, c.name)) for point in points], {"units": c.unit})
+            f"point_{c.name}": (
+                [float(getattr(point.operation, c.name)) for point in points],
+                {
+                    "units": c.unit,
+                    "description": f"{c.description.partition(' of the joint')[0]} at the operating point",
+                },
+            )
             for c in OPERATING
             if c.name in known
         }

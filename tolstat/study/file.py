@@ -300,7 +300,7 @@ def load(
         return path if n is None else load(path.path, n, path.text)
     file = Reading(*rewriting.source(path, text), SECTIONS)
     if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
-        file.data["sampling"]["n"] = n
+        file.data["sampling"]["n"] = n if isinstance(n, bool) or not hasattr(n, "__index__") else n.__index__()
     file.parts |= {name: own for name, own in (("joint", joint), ("joint2", joint2)) if own is not None}
     _read(file, READERS)
     _check(file)

@@ -291,8 +291,8 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
             told = ", ".join(f"{text.percent(share)} at {point}" for point, share in used)
             yield f"share of the life of all bearings that each operating point uses up, mean of the joints: {told}"
     yield (
-        "P is by laminae (ISO/TS 16281): the load with the same L10r on the bearing in line and without clearance. "
-        "Pressure: of the most loaded lamina, without the stress at the ends of a needle"
+        "P is by laminae (ISO/TS 16281): the load with the same L10r on the bearing, profile included, in line and "
+        "without clearance. Pressure: of the most loaded lamina, without the stress at the ends of a needle"
     )
     laws = {joint.contact.law for joint in recorded.joints_at(lives.view.store, 0)} - {"needles"}
     if laws:

@@ -14,7 +14,7 @@ from tolstat.common.late import pandas as pd
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.questions.fatigue.counting import settings_of
-from tolstat.questions.fatigue.loads import damage_sums, load_cycles
+from tolstat.questions.fatigue.loads import channels, damage_sums, load_cycles
 from tolstat.questions.fatigue.parts import evaluated, load_stresses
 from tolstat.store.view import View
 
@@ -31,15 +31,15 @@ def quantity(view: View, name: str) -> Sample:
     return Sample.of(frame[column].to_numpy(), view.status, view.design, name=column, unit="1")
 
 
-def fatigue_by_joint(view: View, names: Sequence[str] | None = None) -> pd.DataFrame:
+def fatigue_by_joint(view: View, names: str | Sequence[str] | None = None) -> pd.DataFrame:
     """Damage sums and damage-equivalent loads of each joint in the service life, over the duty cycle.
 
     Parameters
     ----------
     view : View
         A campaign.
-    names : sequence of str, optional
-        Channels whose equivalent loads are wanted, such as ``cross1.F_t``, ``cross1.F at 30 deg``; by default the
+    names : str or sequence of str, optional
+        Channels whose equivalent loads are wanted, or patterns: ``cross*.F_t``, ``cross1.F at 30 deg``; by default the
         components of the bushing loads.
 
     Returns
@@ -54,7 +54,10 @@ def fatigue_by_joint(view: View, names: Sequence[str] | None = None) -> pd.DataF
     InputError
         When the shares of the operating points are not known, or a channel is none.
     """
-    loading = load_cycles(view, names)
+    if not isinstance(view, View):
+        raise input_error("fatigue_by_joint", f"{type(view).__name__} is no view", "give store.view()")
+    patterns = [names] if isinstance(names, str) else names
+    loading = load_cycles(view, None if patterns is None else channels(patterns, view.mechanism))
     settings, columns, units = loading.settings, dict[str, FloatArray](), dict[str, str]()
     columns |= {f"damage {name}": sums for name, sums in damage_sums(loading.cycles, settings).items()}
     if settings.points:

@@ -198,7 +198,7 @@ def test_a_script_without_a_main_guard_is_told(tmp_path: Path) -> None:
     python = [sys.executable, str(script)]
     ended = subprocess.run(python, env=environment(), capture_output=True, text=True, check=False)
     assert ended.returncode == 1
-    assert "WorkerDied" in ended.stderr
+    assert "Unguarded" in ended.stderr
     assert '__name__ == "__main__"' in ended.stderr
     assert ended.stderr.count("Traceback") == 1  # no worker adds its own
 

@@ -48,10 +48,8 @@ def test_an_interval_up_to_the_accepted_share_is_kept_and_one_from_it_on_is_open
 def test_a_life_that_cannot_be_rated_is_told_with_the_reason(tmp_path):
     with ResultFile.open(synthetic.store(tmp_path, STUDY.replace('needle_diameter = "4 mm"\n', ""))) as store:
         (found,) = life_verdicts(store.view(), 0.1)
-    assert (
-        found.sentence
-        == "No verdict: bearing life: small.h5: holds needle bearings without needle_diameter, which a rating life needs"
-    )
+    lacking = "small.h5: holds needle bearings without needle_diameter, which a rating life needs"
+    assert found.sentence == f"No verdict: bearing life: {lacking}"
 
 
 def test_no_verdict_on_what_is_not_required_or_no_sample(tmp_path):

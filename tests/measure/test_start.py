@@ -6,8 +6,7 @@ from tests.measure import start
 
 
 @pytest.mark.slow  # compiles the kernels twice
-def test_a_checkout_beside_itself(monkeypatch, capsys):
-    monkeypatch.setattr(start, "STUDY", "studies/clearance.toml")
+def test_a_checkout_beside_itself(capsys):
     start.main([str(start.HERE), "--rounds", "1", "--compilations", "1"])
     head, *rows = capsys.readouterr().out.splitlines()
     assert head.split()[-1] == "ratio"

@@ -192,10 +192,7 @@ def scene(view: View) -> tuple[str, str]:
     """
     points = [view.store.points[name] for name in view.points]
     at = points[0].in_words if len(points) == 1 else f"{len(points)} operating points"
-    _, laws = recorded.mountings(view.store)
-    bearing = "bearings" if len({law == "needles" for law in laws}) > 1 else "plain bearings"
-    has_needles = set(laws) == {"needles"} or recorded.joint_of(view.store, 0).bearing is not None
-    bearing = "needle bearings" if has_needles else bearing
+    bearing = recorded.bearings_in_words(view.store)
     mounting, law = recorded.in_words(view.store).split("; ")
     assumed: set[str] | None = None  # where the study can no longer be read
     with suppress(TolstatError):

@@ -16,6 +16,7 @@ from tolstat.common.strict import validate
 from tolstat.common.tables import Options, from_names, tables
 from tolstat.common.wording import Wording
 from tolstat.joint import MEANS, SPLINE, Joint, Operation, OperationOfLinkage, operating, perturb, varied
+from tolstat.joint.bearing import FOR_LIFE
 from tolstat.joint.derived import get
 from tolstat.joint.model import leaves, nested
 from tolstat.joint.sections import RIGID, mounting_and_law
@@ -161,6 +162,22 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     if joint2 := joint2_of(store):
         return [joint2.shaft.axial], [*laws, joint2.contact.law]
     return [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed], laws
+
+
+def bearings_in_words(store: Reader) -> str:
+    """``needle bearings`` where the contact law is that of needles or a bearing has what a life needs, else ``plain``.
+
+    Without an adjective where joints differ.
+    """
+    laws = mountings(store)[1]
+    joints = [joint_of(store, 0)] * len(laws)
+    if joint2 := joint2_of(store):
+        joints[-1] = joint2
+    rolling = {
+        law == "needles" or (joint.bearing is not None and not joint.bearing.lacking(FOR_LIFE))
+        for law, joint in zip(laws, joints, strict=True)
+    }
+    return "bearings" if len(rolling) > 1 else "needle bearings" if True in rolling else "plain bearings"
 
 
 def note_on_mounting(store: Reader) -> str:

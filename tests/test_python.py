@@ -161,13 +161,23 @@ def test_histories_of_chosen_joints_are_a_labelled_array(duty_cycle):
     again = tolstat.replay(duty_cycle, 4, "drive").result.to_pandas()
     np.testing.assert_array_equal(loads.sel(row=4, channel="cross1.F_t"), again["cross1.F_t"])
     np.testing.assert_array_equal(loads["theta"], again["theta"])
+    units = dict(zip(loads["channel"].to_numpy(), loads["unit"].to_numpy(), strict=True))
+    expected = {
+        "tau": "1",
+        "cross1.F_t": "N",
+        "fork2.T_z": "N m",
+        "pin1.contact_outer": "N",
+        "input.m_x": "N m",
+        "pin1.mode": "1",
+    }
+    assert {name: units[name] for name in expected} == expected
 
 
 def test_damage_by_joint_follows_from_a_netcdf_file(duty_cycle, tmp_path):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
     with tolstat.open(duty_cycle) as store:
-        store.to_xarray(histories=["cycles"]).to_netcdf(tmp_path / "duty.nc", engine="h5netcdf")
+        store.to_xarray(histories="cycles").to_netcdf(tmp_path / "duty.nc", engine="h5netcdf")
         expected = tolstat.fatigue_by_joint(store.view(), ["cross1.F_t"])
     with xarray.open_dataset(tmp_path / "duty.nc") as data:
         turns = data["share"] * data["point_speed"]

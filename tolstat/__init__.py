@@ -13,9 +13,11 @@ that the command line starts at once.
 
 from __future__ import annotations
 
+from inspect import isroutine
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common import late
+from tolstat.common.arguments import checked
 from tolstat.questions import PUBLIC, told
 
 if TYPE_CHECKING:
@@ -103,7 +105,8 @@ _named = late.names(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    return told(_named(name)) if name in PUBLIC else _named(name)
+    named = told(_named(name)) if name in PUBLIC else _named(name)
+    return checked(named) if isroutine(named) else named
 
 
 def __dir__() -> list[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, load_histories
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory, load_histories, unit_of
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.load_kinds import CONTACTS, kinds, measure_of
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 KEPT = {"histories": "histories", "n_harmonics": "harmonics"}
 """Key of ``[output]`` that each parameter of the simulation has its value from."""
+PLAIN_UNITS = {"theta": "rad", "tau": "1", "Psi": "1", "mode": "1"}
+"""Units of columns of a trace that are no loads."""
 
 
 class CaseResult(NamedTuple):
@@ -109,6 +111,7 @@ class CaseResult(NamedTuple):
         ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
+        ``attrs["units"]`` has the SI unit of each column.
         """
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
@@ -127,7 +130,15 @@ class CaseResult(NamedTuple):
         columns |= _components(of_loads[SHAFT_LOADS], histories)
         for p, pin in enumerate(pins):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
-        return pd.DataFrame(columns)
+        frame = pd.DataFrame(columns)
+        frame.attrs["units"] = {name: self._unit_of(name) for name in columns}
+        return frame
+
+    def _unit_of(self, column: str) -> str:
+        what = column.rpartition(".")[2]
+        if what in PLAIN_UNITS:
+            return PLAIN_UNITS[what]
+        return "N" if what.startswith("contact_") else unit_of(column, self.mechanism)
 
 
 def _components(history: LoadHistory, histories: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -262,8 +273,8 @@ def histories(source: str | Path | Reader, rows: Sequence[int], point: str = "")
     Returns
     -------
     xarray.DataArray, (rows, theta, channels)
-        Columns of `CaseResult.to_pandas`, SI; coordinates ``row``, ``theta`` (rad) and ``channel``. All rows need the
-        same number of steps per revolution.
+        Columns of `CaseResult.to_pandas`, SI; coordinates ``row``, ``theta`` (rad), ``channel`` and along it
+        ``unit``. All rows need the same number of steps per revolution.
 
     Raises
     ------
@@ -278,8 +289,15 @@ def histories(source: str | Path | Reader, rows: Sequence[int], point: str = "")
         raise input_error("rows", f"{rows!r} are no rows", "give a list of them, such as [17, 45]")
     with viewed(source) as view:
         frames = [_again(view.at(point).store, row).result.to_pandas().set_index("theta") for row in rows]
-    coords = {"row": list(rows), "theta": frames[0].index.to_numpy(), "channel": list(frames[0].columns)}
-    return xarray.DataArray(np.stack([frame.to_numpy(float) for frame in frames]), coords, name="loads")
+    channels = list(frames[0].columns)
+    coords = {
+        "row": list(rows),
+        "theta": frames[0].index.to_numpy(),
+        "channel": channels,
+        "unit": ("channel", [frames[0].attrs["units"][name] for name in channels]),
+    }
+    values = np.stack([frame.to_numpy(float) for frame in frames])
+    return xarray.DataArray(values, coords, ("row", "theta", "channel"), name="loads")
 
 
 def _again(store: Reader, row: int) -> Replay:

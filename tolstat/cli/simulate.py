@@ -200,7 +200,8 @@ def evaluate(
     write(out, lambda to: csv.writer(to, lineterminator="\n").writerows([*head, *library.text.csv_rows([*rows])]))
     status = found.frame["status"]
     invalid = status[~status.isin([state.label for state in library.tables.VALID])]
-    say(f"{'' if out == '-' else f'wrote {out}: '}{len(status)} joints, {len(invalid)} of them without a valid load")
+    wrote = "" if out == "-" else f"wrote {out}: "
+    say(f"{wrote}{len(status)} joints, {len(invalid) or 'none'} of them without a valid load")
     for state in (state for state in library.tables.Status if state.label in invalid.unique()):
         hint = library.remedy.WITHOUT_RESULTS.get(state)
         say(f"{int((invalid == state.label).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")

@@ -102,14 +102,14 @@ class ResultFile(Reader):
         whole.attrs = frames[0].attrs
         return whole
 
-    def to_xarray(self, nominal: bool = False, histories: Sequence[str] = ()) -> xarray.Dataset:
+    def to_xarray(self, nominal: bool = False, histories: str | Sequence[str] = ()) -> xarray.Dataset:
         """Export errors and results along ``row``, with units and descriptions.
 
         Parameters
         ----------
         nominal : bool
             As in `to_pandas`.
-        histories : sequence of str
+        histories : str or sequence of str
             Histories of the file, such as ``cycles``, which are added with their axes.
 
         Returns
@@ -143,7 +143,7 @@ class ResultFile(Reader):
             values = (("point", "row"), np.stack(at_each)) if of_point else ("row", at_each[0])
             data[name] = (*values, units.get(name, {}))
         slots = np.arange(0 if nominal else self.first_sample, self.n)
-        for name in histories:
+        for name in [histories] if isinstance(histories, str) else histories:
             each = [part.histories(name, slots) for part in self.each()]
             spec = self.history_specs[name]
             about = {"units": spec.unit, "description": spec.description}

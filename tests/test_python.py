@@ -165,9 +165,9 @@ def test_histories_of_chosen_joints_are_a_labelled_array(duty_cycle):
     expected = {
         "tau": "1",
         "cross1.F_t": "N",
-        "fork2.T_z": "N m",
+        "fork2.T_z": "N*m",
         "pin1.contact_outer": "N",
-        "input.m_x": "N m",
+        "input.m_x": "N*m",
         "pin1.mode": "1",
     }
     assert {name: units[name] for name in expected} == expected

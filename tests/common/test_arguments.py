@@ -6,30 +6,33 @@ import pytest
 import tolstat
 from tolstat.common.arguments import checked
 from tolstat.common.errors import InputError
-from tolstat.display.options import Load, Top
+from tolstat.display.options import Load, Loads, Top
 
 STUDY = "studies/clearance.toml"
 
 
-def ask(view: object, top: Top, by: Load = None, level: float = 1.0, *paths: str) -> tuple[object, ...]:
+def ask(view: object, top: Top, by: Load = None, level: float = 1.0, loads: Loads = None) -> tuple[object, ...]:
     """Stand in for a question."""
-    return view, top, by, level, paths
+    return view, top, by, level, loads
 
 
 @pytest.mark.parametrize("top", [3, np.int64(3), np.uint8(3)])
 @pytest.mark.parametrize("level", [1, 1.5, np.float32(1.5), np.int16(2)])
-@pytest.mark.parametrize("by", [None, "cross1.F"])
-def test_right_types_pass(top, level, by):
-    assert checked(ask)("any", top, by, level=level) == ("any", top, by, level, ())
+@pytest.mark.parametrize(
+    ("by", "loads"), [(None, None), ("cross1.F", ["cross1.F"]), ("cross1.F", ("cross1.F", "cross1.T"))]
+)
+def test_right_types_pass(top, level, by, loads):
+    assert checked(ask)("any", top, by, level=level, loads=loads) == ("any", top, by, level, loads)
 
 
 def test_wrong_types_are_told_together():
     with pytest.raises(InputError) as caught:
-        checked(ask)("any", "3", 7, level="high")
+        checked(ask)("any", "3", 7, level="high", loads="cross1.F")
     assert str(caught.value).splitlines()[::2] == [
         "top: '3' is of type str",
         "by: 7 is of type int",
         "level: 'high' is of type str",
+        "loads: 'cross1.F' is of type str",
     ]
     assert "give a text or None" in str(caught.value)
 

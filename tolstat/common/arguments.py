@@ -9,7 +9,8 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from sys import modules
-from typing import Any, get_args
+from types import UnionType
+from typing import Annotated, Any, get_args, get_origin
 
 from tolstat.common.errors import Fault, InputError
 
@@ -17,6 +18,7 @@ KINDS: dict[Any, tuple[tuple[type, ...], str]] = {
     int: ((Integral,), "a whole number"),
     float: ((Real,), "a number"),
     str: ((str,), "a text"),
+    list: ((list, tuple), "a list"),
     Path: ((str, PathLike), "a path"),
     type(None): ((type(None),), "None"),
 }
@@ -54,7 +56,10 @@ def _types(annotation: Any, function: Callable[..., Any]) -> Iterator[type]:
     if isinstance(annotation, str):
         for part in annotation.split(" | "):
             yield from _types(NAMED.get(part) or vars(modules[function.__module__]).get(part, object), function)
-    elif hasattr(annotation, "__metadata__"):
-        yield from _types(annotation.__origin__, function)
+    elif get_origin(annotation) is Annotated:
+        yield from _types(get_args(annotation)[0], function)
+    elif isinstance(annotation, UnionType):
+        yield from (kind for part in get_args(annotation) for kind in _types(part, function))
     else:
-        yield from (kind if isinstance(kind, type) else object for kind in get_args(annotation) or (annotation,))
+        plain = get_origin(annotation) or annotation
+        yield plain if isinstance(plain, type) else object

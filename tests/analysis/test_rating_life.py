@@ -6,7 +6,7 @@ import doctest
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import integrate, optimize, stats
 
 from tolstat.analysis import rating_life
 from tolstat.analysis.rating_life import (
@@ -114,6 +114,32 @@ def test_life_of_a_population_is_the_quantile_of_lives_drawn_from_it(reliability
     lives = stats.lognorm(0.6).rvs(n, random_state=rng)
     scale = lives / (-np.log(reliability)) ** (8 / 9)
     drawn = scale * stats.weibull_min(9 / 8).rvs(n, random_state=rng)
-    found = population_life(lives[:20_000], reliability)
+    found = population_life(lives[:20_000], reliability, None).estimate
     assert found == pytest.approx(np.quantile(drawn, 1 - reliability), rel=0.05)
     assert found < 0.9 * np.median(lives)  # the quantile of the median load is no quantile of the population
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("of_lot", [0.0, 0.4])
+def test_interval_of_the_life_of_a_population_covers_it(of_lot):
+    """Loads by a log-normal whose population's L10 is known by scipy's integral; lots of 10, 0.4 of the scatter theirs.
+
+    The wrong estimator, which takes joints of lots as independent, misses the L10 too often.
+    """
+    rng, lots, size, trials = np.random.default_rng(6), 60, 10, 800
+
+    def survives(log_time):
+        def part(x):
+            return stats.norm.pdf(x) * 0.9 ** np.exp((log_time - 0.6 * x) * 9 / 8)
+
+        return integrate.quad(part, -8.0, 8.0)[0]
+
+    true = np.exp(optimize.brentq(lambda log_time: survives(log_time) - 0.9, -4.0, 2.0))
+    covered = np.zeros(2)
+    for _ in range(trials):
+        both = np.sqrt(of_lot) * rng.normal(size=(lots, 1)) + np.sqrt(1.0 - of_lot) * rng.normal(size=(lots, size))
+        for k, groups in enumerate((np.repeat(np.arange(lots), size), np.arange(lots * size))):
+            _, lower, upper = population_life(np.exp(0.6 * both.ravel()), 0.9, groups)
+            covered[k] += lower <= true <= upper
+    assert covered[0] / trials == pytest.approx(0.95, abs=0.025)
+    assert (covered[1] / trials > 0.9) == (of_lot == 0.0)

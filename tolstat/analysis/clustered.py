@@ -155,6 +155,10 @@ class Clustered(Design):
     def __init__(self, lots: NDArray[np.intp]) -> None:
         self.numbers, self._lots = np.unique(lots, return_inverse=True)
 
+    def groups(self, n: int) -> NDArray[np.intp]:
+        """See `Design.groups`: the lots."""
+        return self._lots
+
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots."""
         above, joints = self.counts(x, levels)

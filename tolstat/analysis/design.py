@@ -68,6 +68,10 @@ class Design:
         """Confidence level with which intervals are computed, for them to hold with `confidence`; by default that."""
         return confidence
 
+    def groups(self, n: int) -> NDArray[np.intp] | None:
+        """Number of the group of each of the n joints, groups independent of each other; by default None: no groups."""
+        return None
+
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """Return the design of some of the joints; by default the same."""
         return self
@@ -104,6 +108,10 @@ class Independent(Design):
     independent = True
     interval = "Clopper–Pearson's"
     covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
+
+    def groups(self, n: int) -> NDArray[np.intp]:
+        """See `Design.groups`: each joint by itself."""
+        return np.arange(n)
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""

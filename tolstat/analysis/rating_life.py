@@ -8,9 +8,11 @@ and Stammler 2024). Small swings count for more, since they stress parts of the 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.bisection import first
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT
 
@@ -124,8 +126,13 @@ def system_life(lives: ArrayLike) -> FloatArray:
         return np.asarray((np.asarray(lives, float) ** -WEIBULL_SLOPE).sum(axis=-1) ** (-1.0 / WEIBULL_SLOPE))
 
 
-def population_life(lives: ArrayLike, reliability: float = 0.9) -> float:
+def population_life(
+    lives: ArrayLike, reliability: float, groups: NDArray[np.intp] | None, confidence: float = 0.95
+) -> Estimate[float]:
     """Life that a share of a population reaches whose members have different loads: both scatter, load and life itself.
+
+    The interval is Student's t over groups of the mean survival at the estimate, taken to the log of the life by the
+    derivative of the survival (delta method; Serfling 1980, section 7.2).
 
     Parameters
     ----------
@@ -134,19 +141,38 @@ def population_life(lives: ArrayLike, reliability: float = 0.9) -> float:
         distributions of slope `WEIBULL_SLOPE`; any unit.
     reliability : float
         The share, of the population, too.
+    groups : ndarray of int, shape (n,), or None
+        Number of the independent group of each member; None: no interval.
+    confidence : float
+        Confidence level of the interval.
+
+    Returns
+    -------
+    Estimate
+        In the unit of `lives`; ends are NaN without at least two groups.
 
     Examples
     --------
-    >>> round(population_life([100.0, 100.0]), 6)
+    >>> round(population_life([100.0, 100.0], 0.9, None).estimate, 6)
     100.0
     """
     known = np.asarray(lives, float)
 
-    def failed(log_time: float) -> bool:
-        survive = reliability ** ((np.exp(log_time) / known) ** WEIBULL_SLOPE)
-        return bool(np.mean(survive) <= reliability)
+    def survival(log_time: float) -> FloatArray:
+        return np.asarray(reliability ** ((np.exp(log_time) / known) ** WEIBULL_SLOPE))
 
-    return float(np.exp(first(failed, np.log(known.min()), np.log(known.max()))))
+    def failed(log_time: float) -> bool:
+        return bool(np.mean(survival(log_time)) <= reliability)
+
+    log_time = float(first(failed, np.log(known.min()), np.log(known.max())))
+    own = survival(log_time)
+    sums = np.zeros(0) if groups is None else np.bincount(np.unique(groups, return_inverse=True)[1], own - own.mean())
+    if sums.size < 2:
+        return Estimate(float(np.exp(log_time)), np.nan, np.nan)
+    error = np.sqrt((sums**2).sum() * sums.size / (sums.size - 1)) / own.size
+    t = special.stdtrit(sums.size - 1, 0.5 + 0.5 * confidence)
+    half = t * error / abs(WEIBULL_SLOPE * np.mean(own * np.log(own)))
+    return Estimate(*(float(np.exp(log_time + off)) for off in (0.0, -half, half)))
 
 
 def critical_amplitude(needles: int, needle_diameter: float, pitch_diameter: float) -> float:

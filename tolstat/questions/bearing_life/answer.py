@@ -111,7 +111,7 @@ def bearing_life(view: View) -> Answer:
         Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``bearings`` (see `bearing_rows`) and
         ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Lives are in hours. Facts
         ``symbol`` of the life, ``critical_amplitude`` (rad), ``used``, ``unrated``, ``short``, ``fretting``,
-        ``load_error`` and ``population`` (h), see `lives.Lives`.
+        ``load_error`` and ``population`` (h, with ``_lower`` and ``_upper``), see `lives.Lives`.
 
     Raises
     ------
@@ -142,8 +142,9 @@ def bearing_life(view: View) -> Answer:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         units = dict.fromkeys(list(contacts[0])[1:], "1")
         parts.append(Table("contacts", title, (bearing, *CONTACTS), contacts, units))
-    names_of_facts = ("critical_amplitude", "used", "unrated", "short", "fretting", "load_error", "population")
+    names_of_facts = ("critical_amplitude", "used", "unrated", "short", "fretting", "load_error")
     facts: dict[str, Any] = {"symbol": lives.bearing.symbol} | {name: getattr(lives, name) for name in names_of_facts}
+    facts |= shares.with_ends("population", lives.population)
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
 
@@ -278,10 +279,13 @@ def _notes(lives: rating.Lives, contacts: Rows) -> Iterator[str]:
             f"{ratings} kN, {factors}) at the joint's speed and misalignment; "
             f"all {all_pins}: until the first of the {all_pins} bearings fails, Weibull slope 9/8"
         )
-    if not math.isnan(lives.population):
+    population = lives.population
+    if not math.isnan(population.estimate):
+        ends = f" (95 % interval {text.number(population.lower)} .. {_hours(population.upper)})"
         yield (
             f"{100.0 * (1.0 - bearing.reliability):.3g} % of all joints together have lost a bearing after "
-            f"{_hours(lives.population)}: life itself scatters, and loads do"
+            f"{_hours(population.estimate)}{'' if math.isnan(population.lower) else ends}: "
+            "life itself scatters, and loads do"
         )
     if len(lives.duty) > 1:
         times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())

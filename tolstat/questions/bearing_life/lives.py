@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.rating_life import population_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import input_error
@@ -131,14 +132,13 @@ class Lives:
         return self.view.count(*VALID)
 
     @property
-    def population(self) -> float:
-        """Life that a share `Bearing.reliability` of all joints reaches, their loads and lives scattering, h.
-
-        NaN where a joint has no life.
-        """
-        hours = self.hours[np.isin(self.view.status, VALID), -1]
-        limited = hours.size > 0 and bool(np.isfinite(hours).all())
-        return population_life(hours, self.bearing.reliability) if limited else np.nan
+    def population(self) -> Estimate[float]:
+        """Life that a share `Bearing.reliability` of all joints reaches, h; NaN where a joint has no life."""
+        design = self.view.design.only(valid := np.isin(self.view.status, VALID))
+        hours = self.hours[valid, -1]
+        if not (hours.size and np.isfinite(hours).all()):
+            return Estimate(np.nan, np.nan, np.nan)
+        return population_life(hours, self.bearing.reliability, design.groups(hours.size), design.level(CONFIDENCE))
 
     @property
     def required(self) -> float:

@@ -11,7 +11,7 @@ from tolstat.common.load_kinds import load_numbers
 from tolstat.common.tables import Options, Status
 from tolstat.kernel.mechanics.loads import OF_FORCES
 from tolstat.kernel.revolution.outcome import check_settled
-from tolstat.kernel.revolution.settle import ALL_LOADS, make_samples
+from tolstat.kernel.revolution.settle import ALL_LOADS, make_samples, summarise
 from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
@@ -142,3 +142,23 @@ def test_combined_statistics_are_those_of_all_revolutions():
     assert (out.largest[16:] == 19).all()
     np.testing.assert_allclose(out.mode_share, 0.25)
     np.testing.assert_allclose(out.equivalent_load, np.mean(np.arange(15.0, 20.0) ** (10 / 3)) ** 0.3)
+
+
+def test_every_statistic_of_a_revolution_is_combined_over_several(params):
+    """A field that `summarise` writes and `combine` forgets would keep, with finer steps, what was there before."""
+    samples, trail = make_samples(1, 36)[0], make_trail(36, 10)
+    for name in samples.dtype.names:
+        samples[name] = 0
+    samples.loads[:] = 1000.0
+    marked = np.full(KERNEL_RESULT.itemsize, 111, "u1").view(KERNEL_RESULT).view(np.recarray)
+
+    def written(by) -> set[str]:
+        out = marked.copy()
+        by(out[0])
+        return {name for name in KERNEL_RESULT.names if not np.any(out[name] == marked[name])}
+
+    of_one = written(lambda out: summarise(params(alpha=0.26)[0], samples, out))
+    trail.revolution[:] = 1.0
+    of_several = written(lambda out: combine(19, 5, trail, out))
+    assert of_one == {"largest", "average", "range", "mode_share", "equivalent_load", "tilt", "line_load"}
+    assert of_several == of_one

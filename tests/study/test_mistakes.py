@@ -14,6 +14,8 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.files import data_dir
 from tolstat.study import assumptions, starter
+from tolstat.study.file import READERS
+from tolstat.study.parts import Parts
 
 STUDY = """[joint]
 base = "own_joint.toml"
@@ -300,3 +302,7 @@ def test_commands_tell_such_warnings(folder: Path) -> None:
 def test_studies_that_come_along_have_no_such_warnings(file: Path) -> None:
     if "[sampling]" in file.read_text("utf-8"):
         assert [*assumptions.warnings(study.load(file, None))] == []
+
+
+def test_each_part_that_is_read_has_its_name_and_no_other() -> None:
+    assert set(Parts.__annotations__) == {*READERS, "notes"}

@@ -301,7 +301,7 @@ def load(
     file = Reading(*rewriting.source(path, text), SECTIONS)
     if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
         file.data["sampling"]["n"] = n if isinstance(n, bool) or not hasattr(n, "__index__") else n.__index__()
-    file.parts |= {name: own for name, own in (("joint", joint), ("joint2", joint2)) if own is not None}
+    file.joint, file.joint2 = joint, joint2
     _read(file, READERS)
     _check(file)
     # of joints that the file lists or sweeps, nothing is known where it has faults
@@ -309,9 +309,9 @@ def load(
     if whole and None not in (file.joint, file.operation, file.solver, file.output):
         read: Tolerances = file.scatter
         apart = ("scatter", "shaft", "joint2", "linkage")
-        parts = {name: part for name, part in file.parts.items() if name not in apart}
+        parts = {name: part for name in READERS if name not in apart and (part := getattr(file, name)) is not None}
         parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
-        study = Study(file.path, file.text, **parts)
+        study = Study(file.path, file.text, **parts, notes=file.notes)
         with gather(file.faults):
             study.check_mounting()
     file.finish("sampling.n" if n is not None else "")
@@ -321,9 +321,9 @@ def load(
 def _read(file: Reading, names: Iterable[str]) -> None:
     """Make parts of sections; one that is there already stays. Faults of a linkage, which gives names, end it."""
     for name in names:
-        if name not in file.parts:
+        if getattr(file, name) is None:
             with gather(file.faults):
-                file.parts[name] = READERS[name](file)
+                setattr(file, name, READERS[name](file))
             if name == "linkage" and "mechanism" in file.data and file.linkage is None:
                 file.finish()
 
@@ -345,9 +345,9 @@ def load_case(path: Given) -> Study:
         )
         raise input_error(file.place, "is a study, not a case of one joint", remedy)
     _read(file, ["joint", "linkage", "joint2", "shaft"])
-    file.parts["points"] = ()
+    file.points = ()
     with gather(file.faults):
-        file.parts["points"] = (Point("", points.operation(file), 1.0),)
+        file.points = (Point("", points.operation(file), 1.0),)
     _read(file, ["operation", "solver", "errors", "limits"])
     if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'

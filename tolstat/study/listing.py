@@ -248,7 +248,7 @@ def _measured(file: Reading, name: str, number: int) -> dict[str, Any]:
     measured, notes = crosses.of_one(file.folder / name, file.mechanism, file.errors or {})
     units_of = error_units(file.mechanism)
     errors = {key: f"{value!r} {units_of[key]}" for key, value in measured.items()}
-    file.parts["notes"] = (*file.parts["notes"], *notes)
+    file.notes = (*file.notes, *notes)
     keys = {"file": None, "errors": errors}
     file.text = rewriting.with_keys(file.text, {("case", number): keys}, file.place)
     return errors

@@ -26,6 +26,7 @@ from tolstat.joint.reading import is_joint
 from tolstat.joint.shaft import by_keys
 from tolstat.study import signals
 from tolstat.study.axes import alike, columns_of, compatible, is_pair, is_zone, own, zone_of, zone_units
+from tolstat.study.parts import Parts
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
@@ -229,10 +230,8 @@ class Assignments:
         return tuple(column for column in columns_of(name) if column.endswith(f"tilt_{about}"))
 
 
-class Reading:
+class Reading(Parts):
     """A study or case file that is being read: its tables, what was made of them, and the faults found so far.
-
-    What was made of the sections are attributes, too; what could not be made is None.
 
     Parameters
     ----------
@@ -255,8 +254,6 @@ class Reading:
         Those found so far.
     claims : Assignments
         Entries that set errors.
-    parts : dict
-        What was made of the sections.
 
     Raises
     ------
@@ -269,25 +266,21 @@ class Reading:
         self._source, self._has_lines = read_text(path) if text is None else text, text is None
         self.text, self.data = self._source, read_toml(path, self._source)
         self.faults: list[Fault] = []
-        self.parts: dict[str, Any] = {"notes": ()}
         self.claims = Assignments(self.place, self.mechanism)
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
             raise input_error(self.place, "is a joint file, not a study or case", remedy)
         if "file" in self.text:
-            self.text, self.parts["notes"] = signals.replaced(self.text, self.data, path, self.faults)
+            self.text, self.notes = signals.replaced(self.text, self.data, path, self.faults)
             self.data = read_toml(path, self.text)
         for key in self.data:
             if key not in sections:
                 self.fault(key, "unknown key", did_you_mean(key, list(sections)))
 
-    def __getattr__(self, name: str) -> Any:
-        return self.parts.get(name)
-
     @property
     def mechanism(self) -> Mechanism:
         """What it is about; while no joint is read, with all that a joint may have."""
-        first, second = (joint.parts if (joint := self.parts.get(name)) else PARTS for name in ("joint", "joint2"))
+        first, second = (joint.parts if joint else PARTS for joint in (self.joint, self.joint2))
         if self.linkage is not None:
             return linkage_mechanism(self.linkage, first)
         return by_keys(self.data.get("shaft"), first, second)

@@ -131,7 +131,7 @@ def test_an_array_of_another_shape(x, words):
     ("arguments", "words"),
     [
         ({"workers": 0}, ["workers: 0 is no number of processes"]),
-        ({"workers": 1.5, "loads": ["cros1.F"]}, ["workers: 1.5 is no number", "'cros1.F' is no load"]),
+        ({"workers": -1, "loads": ["cros1.F"]}, ["workers: -1 is no number", "'cros1.F' is no load"]),
         ({"loads": []}, ["loads: is empty"]),
         ({"study": 7}, ["study: an object of type int is none"]),
         ({"study": ROOT / "tests/golden/schema.h5"}, ["schema.h5: is a result file (HDF5), and text is needed"]),

@@ -1,6 +1,7 @@
 """Drawings of a joint: drawn places against the kernel's axes, senses of errors against `perturb`, the command."""
 
 import re
+from inspect import unwrap
 from itertools import combinations
 
 import matplotlib as mpl
@@ -337,5 +338,5 @@ def test_figures_of_the_package(cirelli):
 
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
-    assert tolstat.draw_errors is answer.draw_errors
+    assert unwrap(tolstat.draw_errors) is answer.draw_errors
     assert len(tolstat.draw_row(cirelli, OPERATION, nominal_errors(1, CARDAN), "one").axes) == 1

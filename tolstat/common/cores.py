@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection
-from numbers import Integral
 from typing import Any, Generic, TypeVar
 
 from tolstat.common.errors import input_error
@@ -66,11 +65,11 @@ def number_of_workers(workers: int | None) -> int:
     Raises
     ------
     InputError
-        When it is no whole number of at least one.
+        When it is below one.
     """
     if workers is None:
         return available_cores()
-    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
+    if workers < 1:
         raise input_error("workers", f"{workers!r} is no number of processes", "give a whole number of at least 1")
     return int(workers)
 

@@ -59,8 +59,9 @@ def history_specs(
         contact += "stations"
         forces = HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force"))
         if histories == "bearings":
-            ends = "products of displacements: outermost station, both, innermost one; NaN where not looked at"
-            return {"contact": forces, "ends": HistorySpec((n, pins, 3), "f8", "m^2", ends, ("theta", "pin", "product"))}
+            products = "products of displacements of the end stations; NaN where they are not recorded"
+            ends = HistorySpec((n, pins, 3), "f8", "m^2", products, ("theta", "pin", "product"))
+            return {"contact": forces, "ends": ends}
         modes = f"contact mode of pins 1-{pins}: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
             "loads": _of_samples(of[BUSHING_LOADS], n),

@@ -152,7 +152,7 @@ def bearing_life(view: View) -> Answer:
 
 
 def bearing_life_on_page(view: View, asked: Asked) -> Answer:
-    """As `bearing_life`, once a joint of a sample has a result; no joint is simulated again if none is asked for."""
+    """As `bearing_life`, once a joint of a sample has a result; without histories on the page, without needles."""
     if not (view.sampled and view.count(*VALID)):
         raise NotApplicable
     answer = bearing_life(view)

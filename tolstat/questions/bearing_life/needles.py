@@ -12,6 +12,7 @@ from tolstat.common.load_kinds import RESULTANT
 from tolstat.common.loads import FloatArray
 from tolstat.common.mechanism import prefixes
 from tolstat.common.parameters import LAMINAE, PLACE, RELIEF
+from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Axes, Panel, Panels, Part
 from tolstat.questions.bearing_life.lives import Lives
@@ -82,21 +83,18 @@ def pressed(store: Reader, slot: int) -> FloatArray:
 
 
 def pictures(lives: Lives) -> list[Part]:
-    """Pictures of the needles in the joint with the shortest life, one for each Cardan joint; none without a life.
+    """Pictures of the needles in the joint with the shortest life, one for each Cardan joint.
 
-    Of several operating points the one with the largest line load is shown. The joint is simulated once a picture is
-    drawn.
+    There are none without a life, or of ideal joints. Of several operating points the one with the largest line load is
+    shown. The joint is simulated once a picture is drawn.
     """
-    view, hours = lives.view, lives.hours[:, -1]
-    if not np.isfinite(hours).any():
+    view, hours, pressure = lives.view, lives.hours[:, -1], lives.worst["pressure"].max(axis=1)
+    known = np.isin(view.status, VALID) & np.isfinite(hours) & np.isfinite(pressure)
+    if not known.any():
         return []
-    sample = np.nanargmin(hours)
+    sample = np.where(known, hours, np.inf).argmin()
     slot = int(view.slots(sample))
-    stored = np.stack(
-        [part.store.results(slice(slot, slot + 1), ("line_load",))["line_load"][0] for part in view.parts]
-    )
-    if not np.isfinite(stored).all():
-        return []
+    stored = np.array([part.read_results(("line_load",))["line_load"][sample] for part in view.parts])
     point = int(stored.max(axis=1).argmax())
     store, slots = view.parts[point].store, (slot, *view.nominal_slots.tolist())
     again = cache(lambda: [pressed(store, one) for one in slots])
@@ -107,8 +105,7 @@ def pictures(lives: Lives) -> list[Part]:
         pins = {pin: k for k, pin in enumerate(lives.pins) if pin.startswith(joint)}
         most = ", ".join(f"{pin} {text.number(1e-3 * stored[point, k])} N/mm" for pin, k in pins.items())
         words = f"Load of the most loaded needle of each bearing by its length, along the needle; at most {most}"
-        draw = partial(_draw, again=again, pins=pins)
-        panels.append(Panel(f"{joint}needles", title, words, draw, (6.4, 3.5)))
+        panels.append(Panel(f"{joint}needles", title, words, partial(_draw, again=again, pins=pins), (6.4, 3.5)))
     return [Panels(panels)]
 
 
@@ -117,8 +114,6 @@ def _draw(ax: Axes, again: Callable[[], Sequence[FloatArray]], pins: dict[str, i
     for i, (pin, k) in enumerate(pins.items()):
         ax.plot(1e3 * worst[k, 0], 1e-3 * worst[k, 1], **style.curve(i), label=pin)
         for joint in nominal:
-            ax.plot(1e3 * joint[k, 0], 1e-3 * joint[k, 1], **style.curve(i) | {"lw": 0.8})
-    if nominal:
-        ax.plot([], [], color=style.INK, lw=0.8, label="thin: without errors")
+            ax.plot(1e3 * joint[k, 0], 1e-3 * joint[k, 1], color=style.INK, lw=0.8, label="without errors")
     ax.set(xlabel="distance from the middle of the needle, outward [mm]", ylabel="load by length [N/mm]")
     ax.set_ylim(bottom=0.0)

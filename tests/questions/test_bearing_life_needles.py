@@ -1,4 +1,4 @@
-"""The load along the needles of the joint with the shortest life: against ISO/TS 16281 by its letter, and its picture."""
+"""Load along the needles of the joint with the shortest life: against ISO/TS 16281 by its letter, and its picture."""
 
 from __future__ import annotations
 

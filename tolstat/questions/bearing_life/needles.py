@@ -113,7 +113,8 @@ def _draw(ax: Axes, again: Callable[[], Sequence[FloatArray]], pins: dict[str, i
     worst, *nominal = again()
     for i, (pin, k) in enumerate(pins.items()):
         ax.plot(1e3 * worst[k, 0], 1e-3 * worst[k, 1], **style.curve(i), label=pin)
-        for joint in nominal:
+    for joint in nominal:
+        for k in pins.values():
             ax.plot(1e3 * joint[k, 0], 1e-3 * joint[k, 1], color=style.INK, lw=0.8, label="without errors")
     ax.set(xlabel="distance from the middle of the needle, outward [mm]", ylabel="load by length [N/mm]")
     ax.set_ylim(bottom=0.0)

@@ -21,7 +21,7 @@ from tolstat.common.load_kinds import CONTACTS, spans
 from tolstat.common.mechanism import Mechanism, carried
 from tolstat.common.tables import Options
 
-Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
+Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full", "bearings"]
 KEPT = 16
 """Maximum number of cycles kept per channel: joints made to ISO 2768-f have 1.7 a channel in the mean, 11 at most."""
 GATE = 1e-4
@@ -41,8 +41,8 @@ def history_specs(
     ----------
     options : Options
         ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
-    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
-        What is kept.
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full", "bearings"}
+        What is kept. Of ``"bearings"``, contact forces and how pins lie in their bearings, no result file holds any.
     n_harmonics : int
         Highest multiple of the input speed that ``"harmonics"`` keeps.
     mechanism : Mechanism
@@ -53,14 +53,19 @@ def history_specs(
     dict of str to HistorySpec
     """
     n = options.steps_per_rev
-    if histories == "full":
+    if histories in ("full", "bearings"):
         pins, of = len(mechanism.pairs), load_histories(mechanism)
         contact = f"contact force of pins 1-{pins}: of the outermost station, of the innermost one, resultant of all "
         contact += "stations"
+        forces = HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force"))
+        if histories == "bearings":
+            products = "products of displacements of the end stations; NaN where they are not recorded"
+            ends = HistorySpec((n, pins, 3), "f8", "m^2", products, ("theta", "pin", "product"))
+            return {"contact": forces, "ends": ends}
         modes = f"contact mode of pins 1-{pins}: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
             "loads": _of_samples(of[BUSHING_LOADS], n),
-            "contact": HistorySpec((n, pins, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
+            "contact": forces,
             "shafts": _of_samples(of[SHAFT_LOADS], n),
             "mode": HistorySpec((n, pins), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
@@ -80,7 +85,7 @@ def extracted(
 ) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     shafts = samples["shafts"][:, carried(mechanism)]
-    if histories == "full":
+    if histories in ("full", "bearings"):
         fields = {name: samples["loads"][:, span] for name, span in spans(mechanism).items()}
         fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         fields[SHAFT_LOADS] = shafts

@@ -80,7 +80,7 @@ def simulate_rows(
         Numerical settings.
     mechanism : Mechanism
         What the joints are.
-    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full", "bearings"}
         Load histories to keep, see `history_specs`.
     n_harmonics : int
         Highest harmonic kept.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,6 +21,7 @@ from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolv
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions import shares
 from tolstat.questions.bearing_life import lives as rating
+from tolstat.questions.bearing_life import needles
 from tolstat.store import recorded
 from tolstat.store.view import View
 
@@ -138,6 +140,7 @@ def bearing_life(view: View) -> Answer:
     most = f"{100.0 * rating.SHARES[-1]:g} % of the joints"
     title = f"Bearings in {most}: P, tilt, pressure at most; life, C0/P0 at least"
     parts.append(Table("bearings", title, (bearing, *BEARINGS), each, units, by_share(each, "place")))
+    parts += needles.pictures(lives)
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         units = dict.fromkeys(list(contacts[0])[1:], "1")
@@ -149,10 +152,12 @@ def bearing_life(view: View) -> Answer:
 
 
 def bearing_life_on_page(view: View, asked: Asked) -> Answer:
-    """As `bearing_life`, once a joint of a sample has a result."""
+    """As `bearing_life`, once a joint of a sample has a result; without histories on the page, without needles."""
     if not (view.sampled and view.count(*VALID)):
         raise NotApplicable
-    return bearing_life(view)
+    answer = bearing_life(view)
+    calm = [part for part in answer.parts if not (isinstance(part, Panels) and part.panels[0].key.endswith("needles"))]
+    return answer if asked.replay else replace(answer, parts=calm)
 
 
 def _verdict(lives: rating.Lives, below: Rows, reached: Rows) -> list[str]:

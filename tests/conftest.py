@@ -145,7 +145,7 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
             yield block, work.function(block)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(os, "sched_getaffinity", lambda _: {0})
+        patch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
         patch.setattr(pool, "map_blocks", quick)
         for name in ("git_commit", "source_hash"):  # neither changes meanwhile
             patch.setattr(metadata, name, cache(getattr(metadata, name)))

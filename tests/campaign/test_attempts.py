@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.support import fakes
+from tests.support.systems import needs_posix
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile
 
@@ -28,6 +29,7 @@ def simulate_deadly(
     return fakes.simulate(params, options, **kept)
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize("block", [1, 4])
 @pytest.mark.parametrize(("alone", "crashed"), [(1, False), (100, True)])

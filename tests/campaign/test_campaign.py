@@ -19,6 +19,7 @@ import pytest
 from tests.support import fakes
 from tests.support.of_cardan import RESULT
 from tests.support.synthetic import HEAD
+from tests.support.systems import needs_posix
 from tolstat import joint
 from tolstat import study as studies
 from tolstat.campaign import blocks as execution
@@ -172,6 +173,7 @@ def start(
     return process
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGTERM)])
 def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, number: signal.Signals) -> None:
@@ -189,6 +191,7 @@ def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, n
     assert datasets(path) == datasets(tmp_path / "b.h5")
 
 
+@needs_posix
 @pytest.mark.slow
 def test_second_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
@@ -316,6 +319,7 @@ def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch:
     assert [signal.getsignal(number) for number in campaign.SIGNALS] == before
 
 
+@needs_posix
 def test_an_ignored_hang_up_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:

@@ -20,6 +20,7 @@ import pytest
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
 from tests.support.blocks import die
+from tests.support.systems import needs_posix
 from tolstat.campaign import pool
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import Work, WorkerDied
@@ -69,6 +70,7 @@ def reference(path: Path) -> dict[str, bytes]:
     return datasets(path)
 
 
+@needs_posix
 @pytest.mark.slow
 def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) -> None:
     path = tmp_path / "a.h5"
@@ -98,6 +100,7 @@ def test_linkages_on_a_cluster_have_the_bytes_of_processes(tmp_path: Path) -> No
     assert datasets(there) == datasets(here)
 
 
+@needs_posix
 @pytest.mark.slow
 def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     study, path = fakes.Study(), tmp_path / "a.h5"
@@ -130,6 +133,7 @@ def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
         list(map_on_cluster(Work(abs, prepare=cannot), range(20), None, 1, lambda: False))
 
 
+@needs_posix
 @pytest.mark.slow
 def test_a_cluster_whose_workers_die_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """Dask does not always start workers again."""

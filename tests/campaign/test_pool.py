@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from tests.conftest import IN_WORKERS as map_blocks
@@ -35,6 +36,7 @@ from tests.support.blocks import (
     very_slow_first,
 )
 from tests.support.environment import environment
+from tests.support.systems import needs_posix
 from tolstat.campaign import pool
 from tolstat.campaign.pool import Lost, Work, WorkerDied, kept_workers
 from tolstat.common.cores import THREAD_VARIABLES, available_cores
@@ -95,6 +97,7 @@ def test_leaving_early_ends_the_workers_at_once() -> None:
     assert time.monotonic() - begin < 50  # not the minute that block 0 takes
 
 
+@needs_posix
 def test_joints_that_fail_twice_are_given_up_alone() -> None:
     blocks = [list(range(first, first + 5)) for first in range(0, 40, 5)]
     found: dict[int, Any] = {}
@@ -110,16 +113,19 @@ def test_joints_that_fail_twice_are_given_up_alone() -> None:
     assert multiprocessing.active_children() == []
 
 
+@needs_posix
 def test_a_single_death_is_nobodys_fault(tmp_path: Path) -> None:
     jobs = [(str(tmp_path), x) for x in range(12)]
     assert dict(map_blocks(Work(bad_luck), jobs, 2)) == {job: job[1] ** 2 for job in jobs}
     assert {int(p.name) for p in tmp_path.iterdir()} == {0, 3, 6, 9}
 
 
+@needs_posix
 def test_the_only_joint_is_given_up_too() -> None:
     assert list(map_blocks(Work(die), [1], 1)) == [(1, Lost("killed by SIGKILL"))]
 
 
+@needs_posix
 def test_workers_that_begin_to_die_end_the_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "MAX_FAILURES", 4)
     seen: dict[Any, Any] = {}
@@ -162,6 +168,7 @@ def test_a_kept_worker_that_has_died_is_replaced() -> None:
         assert dict(map_blocks(Work(abs), [-4], 1)) == {-4: 4}
 
 
+@needs_posix
 @pytest.mark.slow
 def test_workers_that_are_killed_while_they_send_change_nothing() -> None:
     chance, ended = random.Random(0), threading.Event()
@@ -242,15 +249,14 @@ def test_workers_end_with_their_parent(tmp_path: Path, rest: str) -> None:
 
 def running(pid: int) -> bool:
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
         return False
-    status = Path(f"/proc/{pid}/stat")
-    return not status.exists() or status.read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
 
 
 def test_available_cores_is_what_this_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1, 5} if process == 0 else {0})
+    allowed = {0: {0, 1, 5}}  # 0 is this process
+    monkeypatch.setattr(os, "sched_getaffinity", allowed.__getitem__, raising=False)
     assert available_cores() == 3
     monkeypatch.delattr(os, "sched_getaffinity")
     assert available_cores() == (os.cpu_count() or 1)

@@ -15,10 +15,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from tests.campaign.test_campaign import datasets, start
 from tests.support import fakes
+from tests.support.systems import needs_posix
 from tolstat.campaign import pool
 from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
@@ -44,6 +46,7 @@ def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> 
             np.testing.assert_array_equal(kept, wanted)
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
 @pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 10)])
@@ -67,6 +70,7 @@ def test_joints_that_kill_or_raise_are_marked_and_cost_only_themselves(
         assert not (store.status() == Status.CRASHED).any()
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
 def test_a_machine_on_which_workers_die_ends_the_run_and_keeps_what_is_done(
@@ -96,6 +100,7 @@ def simulate_until(params: np.ndarray, options: Options, folder: str, **kept: An
     return fakes.simulate(params, options, **kept)
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
 def test_a_joint_that_kills_in_the_check_of_a_run_does_not_end_it(tmp_path: Path) -> None:
@@ -115,6 +120,7 @@ def simulate_checks_badly(params: np.ndarray, options: Options, **kept: Any) -> 
     return fakes.simulate(params, options, **kept)
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
 def test_a_joint_that_kills_in_the_pilot_of_a_fidelity_is_no_joint_of_the_others() -> None:
@@ -149,6 +155,7 @@ def perturb_badly(joint: object, operation: Operation, errors: np.ndarray) -> np
     return params
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", range(20 if LONG else 1))
 def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
@@ -169,32 +176,21 @@ def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str
     assert datasets(path) == expected
 
 
-@pytest.mark.parametrize("moment", range(5 if LONG else 1))
+@needs_posix
 @pytest.mark.slow
+@pytest.mark.parametrize("moment", range(5 if LONG else 1))
 def test_workers_killed_at_random_change_no_byte(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
     chance, path = random.Random(moment), tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
     for _ in range(3):
         time.sleep(chance.uniform(0, 0.3))
-        workers = children(process.pid)
+        alive = psutil.process_iter(["ppid", "cmdline"])
+        workers = [one for one in alive if one.info["ppid"] == process.pid and "spawn_main" in str(one.info["cmdline"])]
         if workers:
-            os.kill(chance.choice(workers), signal.SIGKILL)
+            chance.choice(workers).kill()
     process.communicate(timeout=60)
     assert process.returncode == 0
     assert datasets(path) == expected
-
-
-def children(parent: int) -> list[int]:
-    """Worker processes of a campaign."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            is_child = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1]) == parent
-            if is_child and b"spawn_main" in (path / "cmdline").read_bytes():
-                found.append(int(path.name))
-        except OSError:
-            continue
-    return found
 
 
 def test_states_without_results_have_none(tmp_path: Path) -> None:

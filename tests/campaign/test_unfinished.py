@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets, start
 from tests.support import damage, fakes
+from tests.support.systems import needs_linux
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
@@ -133,6 +134,7 @@ def limited(path: Path, size: int) -> str:
     return ended.stderr.rpartition("StoreError: ")[2]
 
 
+@needs_linux
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [20_000, 400_000])
 def test_files_that_cannot_grow(tmp_path: Path, size: int) -> None:
@@ -162,6 +164,7 @@ def read_only(small_disk: Path) -> Iterator[Path]:
     subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
 
 
+@needs_linux
 def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expected: dict[str, bytes]) -> None:
     with pytest.raises(
         StoreError, match=r"new\.h5: cannot be written: Read-only file system\n  hint: check that the folder"
@@ -179,6 +182,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
     assert datasets(moved) == expected
 
 
+@needs_linux
 @pytest.mark.slow
 def test_a_full_disk_is_told_before_the_first_joint(small_disk: Path) -> None:
     told: list[Counts] = []
@@ -188,6 +192,7 @@ def test_a_full_disk_is_told_before_the_first_joint(small_disk: Path) -> None:
     assert list(small_disk.iterdir()) == []
 
 
+@needs_linux
 @pytest.mark.slow
 def test_a_disk_without_room_for_a_second_copy_keeps_the_first(small_disk: Path, tmp_path: Path) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), small_disk / "a.h5"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import os
-import pty
 import subprocess
 import sys
 from io import StringIO
@@ -15,6 +14,7 @@ import pytest
 
 from tests.support import corruption, synthetic
 from tests.support.environment import environment
+from tests.support.systems import needs_linux
 from tolstat.cli import _shared
 from tolstat.display import text
 from tolstat.store import metadata
@@ -37,6 +37,7 @@ def test_cells_of_text_are_no_formulas() -> None:
     assert [text.cell(x) for x in (-1.0, -1)] == [-1.0, -1]
 
 
+@needs_linux
 def test_exports_hold_no_formulas(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, CASES)
     ended = corruption.call(["export", path, "--csv", "-"], tmp_path)
@@ -52,12 +53,13 @@ def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().err == "a[U+001B][2J[U+009B]1m[U+202E]b[U+000D]c\nd\n"
 
 
+@needs_linux
 def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=0)
     with h5py.File(path, "r+") as file:
         metadata.write(file, metadata.read(file).model_copy(update={"study_name": "a\x1b]0;title\x07b"}))
     command = [sys.executable, "-m", "tolstat", "status", str(path)]
-    own, terminal = pty.openpty()
+    own, terminal = os.openpty()
     subprocess.run(command, stdout=terminal, stderr=subprocess.DEVNULL, env=environment(), check=True)
     os.close(terminal)
     shown = os.read(own, 10_000).decode()
@@ -66,6 +68,7 @@ def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path
     assert corruption.call(["status", path], tmp_path).out.startswith("study: a\x1b]0;title\x07b")
 
 
+@needs_linux
 @pytest.mark.slow
 def test_a_changed_bit_changes_nothing_without_a_word(tmp_path: Path) -> None:
     """A share of ``python -m tests.measure.corruption``."""
@@ -76,6 +79,7 @@ def test_a_changed_bit_changes_nothing_without_a_word(tmp_path: Path) -> None:
     assert min(kinds[kind] for kind in ("same", "refused", "told")) > 2
 
 
+@needs_linux
 @pytest.mark.slow
 def test_a_changed_bit_of_an_unfinished_file_ends_in_data_or_one_message(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=30)

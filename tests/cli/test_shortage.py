@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from tests.support import corruption, synthetic
 from tests.support.environment import ROOT, environment
+from tests.support.systems import needs_linux
 from tolstat import cli
 from tolstat.common.errors import InputError
 from tolstat.common.files import check_target, reason
@@ -51,6 +52,7 @@ def test_errors_that_no_machine_would_mend_stay_errors(monkeypatch: pytest.Monke
     assert isinstance(done.exception, OSError)
 
 
+@needs_linux
 @pytest.mark.slow
 def test_a_process_that_may_use_too_little_memory_says_so(tmp_path: Path) -> None:
     limit = 400 * 10**6
@@ -105,6 +107,7 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
     assert (tmp_path / "page.html").read_bytes() == b"the old one"
 
 
+@needs_linux
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words",

@@ -16,29 +16,31 @@ import pytest
 from tests.campaign.test_campaign import datasets
 from tests.conftest import CHEAP
 from tests.support.environment import ROOT, environment
+from tests.support.systems import needs_linux
 from tolstat import run, study
 from tolstat.common.shell import quote
 from tolstat.store import ResultFile, Writer
 
 REFUSED = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[. ]$')
 """What Windows refuses in the name of a file."""
-simulated = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs Linux")
+NOT_EVERYWHERE = re.compile(r"^\s*(?:import|from) (?:os|signal|fcntl|grp|pty|pwd|resource|syslog|termios|tty)\b", re.M)
+"""Imports of what Windows lacks, or lacks names of."""
 
 
-def process(folder: Path, *words: str) -> subprocess.Popen[str]:
+def process(folder: Path, *words: str, module: str = "tolstat") -> subprocess.Popen[str]:
     """Start a command in a folder."""
     paths = os.pathsep.join([str(ROOT / "tests" / "support" / "windows"), str(ROOT)])
     own = environment() | {"PYTHONPATH": paths, "PYTHONIOENCODING": "cp1252"}
-    python = [sys.executable, *([] if "dask" in words else ["-W", "error"]), "-m", "tolstat", *words]
+    python = [sys.executable, *([] if "dask" in words else ["-W", "error"]), "-m", module, *words]
     pipe = subprocess.PIPE
     return subprocess.Popen(python, env=own, cwd=folder, stdout=pipe, stderr=pipe, encoding="cp1252")
 
 
-def command(folder: Path, *words: str, code: int = 0) -> str:
+def command(folder: Path, *words: str, code: int = 0, module: str = "tolstat") -> str:
     """Run a command in a folder; gives what it prints and says."""
-    with process(folder, *words) as running:
+    with process(folder, *words, module=module) as running:
         printed, said = running.communicate()
-    assert running.returncode == code, said
+    assert running.returncode == code, printed + said
     return printed + said
 
 
@@ -66,7 +68,7 @@ def whole(folder: Path) -> Path:
     return folder / "few.h5"
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 def test_a_campaign_is_interrupted_and_resumed(folder: Path, tmp_path: Path) -> None:
     """Meanwhile others may read its file; in the end it has the bytes of any other run."""
@@ -85,7 +87,7 @@ def test_a_campaign_is_interrupted_and_resumed(folder: Path, tmp_path: Path) -> 
     assert datasets(path) == datasets(tmp_path / "a.h5")
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 def test_slices_are_merged(folder: Path, whole: Path) -> None:
     for name, rows in {"a.h5": "0:20", "b.h5": "20:201"}.items():
@@ -96,7 +98,7 @@ def test_slices_are_merged(folder: Path, whole: Path) -> None:
     assert {name.partition("/")[0] for name in merged} >= {"errors", "results", "histories"}
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("distributed") is None, reason="needs Dask")
 def test_a_cluster_gives_the_same_bytes(folder: Path, whole: Path) -> None:
@@ -104,7 +106,7 @@ def test_a_cluster_gives_the_same_bytes(folder: Path, whole: Path) -> None:
     assert datasets(folder / "cluster.h5") == datasets(whole)
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 def test_files_are_those_of_any_system(folder: Path, whole: Path) -> None:
     """Written in UTF-8, with the same line ends, under names that Windows takes."""
@@ -121,7 +123,7 @@ def test_files_are_those_of_any_system(folder: Path, whole: Path) -> None:
             path.read_text(encoding="utf-8")
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 def test_one_process_writes_a_file(folder: Path, whole: Path) -> None:
     with Writer.open(whole) as store:
@@ -131,7 +133,7 @@ def test_one_process_writes_a_file(folder: Path, whole: Path) -> None:
     assert "running: no" in command(folder, "status", "few.h5")
 
 
-@simulated
+@needs_linux
 @pytest.mark.slow
 def test_a_file_that_another_program_has_open_is_told(folder: Path, whole: Path) -> None:
     content = whole.read_bytes()
@@ -140,6 +142,32 @@ def test_a_file_that_another_program_has_open_is_told(folder: Path, whole: Path)
     assert "few.h5: cannot be replaced: " in said
     assert "close it in other programs" in said
     assert whole.read_bytes() == content
+
+
+def collected(*paths: Path, code: int = 0) -> str:
+    """Let pytest import test modules; gives what it prints."""
+    words = ("--collect-only", "-q", "-m", "", "-p", "no:cacheprovider", "--rootdir", str(ROOT))
+    return command(ROOT, *words, *map(str, paths), code=code, module="pytest")
+
+
+@needs_linux
+@pytest.mark.slow
+def test_all_test_modules_are_imported() -> None:
+    """Those without such imports are imported everywhere."""
+    tests = (ROOT / "tests").rglob("test_*.py")
+    assert "test_all_test_modules_are_imported" in collected(
+        *(path for path in tests if NOT_EVERYWHERE.search(path.read_text(encoding="utf-8")))
+    )
+
+
+@needs_linux
+@pytest.mark.slow
+@pytest.mark.parametrize("line", ["import resource", "from signal import SIGKILL", "import os\nos.killpg"])
+def test_a_test_module_that_needs_more_is_not_imported(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "tests_of_one_system.py"  # a name like those of this folder's modules
+    path.write_text(f"{line}\n\n\ndef test_nothing():\n    pass\n", encoding="utf-8")
+    assert NOT_EVERYWHERE.search(line)
+    assert "error" in collected(path, code=2)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from tests.support.environment import environment
+from tests.support.systems import needs_linux
 from tolstat.common.cores import CAN_FORK, Forked, mapped
 
 
@@ -42,7 +43,7 @@ def test_what_fails_raises_where_the_result_is_asked_for() -> None:
         other.result()
 
 
-@pytest.mark.skipif(not CAN_FORK, reason="no fork here")
+@needs_linux
 def test_no_process_outlives_one_that_is_killed() -> None:
     """The pipe of standard output is open as long as any of the three processes lives."""
     command = [sys.executable, "-c", KILLED]

@@ -13,6 +13,7 @@ from tests.measure import commands, usage
 from tests.measure.commands import Row
 from tests.support import synthetic
 from tests.support.environment import environment
+from tests.support.systems import needs_posix
 
 WORDS = ("run", "report", "causes", "export")
 
@@ -40,6 +41,7 @@ def study(tmp_path):
     return path
 
 
+@needs_posix
 def test_memory_is_that_of_the_largest_process_and_not_of_the_one_that_measures():
     ballast = b"x" * 150_000_000
     small = used("-c", "pass")
@@ -57,6 +59,7 @@ def test_growth_is_the_exponent_of_the_time():
     assert found[8:] == pytest.approx(exponents)
 
 
+@needs_posix
 @pytest.mark.slow
 def test_commands_run_one_after_the_other_and_leave_no_file(study, tmp_path):
     study.write_text(f'{synthetic.REAL.partition("[limits]")[0]}[limits]\n"cross1.F" = "700 N"\n', encoding="utf-8")

@@ -3,8 +3,10 @@
 import pytest
 
 from tests.measure import start
+from tests.support.systems import needs_posix
 
 
+@needs_posix
 @pytest.mark.slow  # compiles the kernels twice
 def test_a_checkout_beside_itself(capsys):
     start.main([str(start.HERE), "--rounds", "1", "--compilations", "1"])

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests.support import fakes, synthetic
+from tests.support.systems import needs_posix
 from tests.support.two_errors import killing, stand_in
 from tolstat import sampling, study
 from tolstat.analysis.design import Independent
@@ -429,6 +430,7 @@ def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, once, monkeypa
         )
 
 
+@needs_posix
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick", "in_workers")
 def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):

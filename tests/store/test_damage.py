@@ -18,6 +18,7 @@ import tolstat
 from tests.campaign.test_campaign import datasets
 from tests.store.test_store import new_store, simulation
 from tests.support import damage, fakes, synthetic
+from tests.support.systems import needs_posix
 from tolstat import cli, study
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
@@ -302,6 +303,7 @@ def test_a_study_that_is_no_study_ends_in_one_message(tmp_path: Path, text: str,
     assert done.exit_code == 0 or str(path) in done.stderr
 
 
+@needs_posix
 def test_pipes_and_devices_are_no_result_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.h5")
     for path in (tmp_path / "pipe.h5", Path("/dev/zero")):

@@ -68,7 +68,7 @@ def test_a_full_disk_is_told_before_the_first_joint(
         asked.append(size)
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("os.posix_fallocate", allocate)
+    monkeypatch.setattr("os.posix_fallocate", allocate, raising=False)
     with pytest.raises(StoreError, match=r"a\.h5: cannot be written: No space left on device\n  hint: check that"):
         fakes.run(study, tmp_path / "a.h5")
     histories = sum(12 * spec.blank(1).nbytes for spec in fakes.SPECS.values())

@@ -18,6 +18,7 @@ import tolstat
 from tests import format_tables
 from tests.support import fakes
 from tests.support.of_cardan import ERROR_COLUMNS, RESULT, RESULT_COLUMNS
+from tests.support.systems import needs_posix
 from tolstat.common import tables
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
@@ -315,6 +316,7 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     assert list(tmp_path.iterdir()) == []
 
 
+@needs_posix
 @pytest.mark.slow
 def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (

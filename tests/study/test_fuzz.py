@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.support import synthetic
+from tests.support.systems import needs_posix
 from tolstat import joint, study
 from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import InputError
@@ -225,6 +226,7 @@ def test_no_unit_is_executed_or_takes_long(tmp_path: Path, unit: str) -> None:
     assert len(said) < 2000, "a message quotes no more than the beginning of a long value"
 
 
+@needs_posix
 def test_pipes_and_devices_are_no_input(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
     for path in (tmp_path / "pipe.toml", Path("/dev/zero")):

@@ -63,7 +63,8 @@ def die_in_the_end(job: tuple[str, int]) -> int:
 
 
 def surroundings(x: int) -> tuple[int, dict[str, str | None], set[Any]]:
-    handlers = {signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    names = ("SIGINT", "SIGTERM", "SIGHUP")  # the last one is not on Windows
+    handlers = {signal.getsignal(getattr(signal, name)) for name in names if hasattr(signal, name)}
     return os.getpid(), {name: os.environ.get(name) for name in THREAD_VARIABLES}, handlers
 
 

@@ -1,6 +1,6 @@
 """Takes away from Python what it does not have on Windows: a process imports this first if the folder is on its path.
 
-Libraries have code of their own for Windows: they keep what they use here, and tolstat alone does without.
+Libraries have code of their own for Windows: they keep what they use here; tolstat and its tests alone do without.
 """
 
 import builtins
@@ -15,7 +15,7 @@ from contextlib import suppress
 
 import filelock
 
-MODULES = {"fcntl", "grp", "pwd", "resource", "syslog", "termios"}
+MODULES = {"fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 NAMES = """
     chown chroot confstr fchmod fchown fork forkpty fpathconf fstatvfs getegid geteuid getgid getgroups getloadavg
     getpgid getpgrp getpriority getresgid getresuid getsid getuid initgroups killpg lchown lockf major makedev minor
@@ -30,9 +30,9 @@ SIGNALS = ("SIGABRT", "SIGFPE", "SIGILL", "SIGINT", "SIGSEGV", "SIGTERM")
 """Signals that it has."""
 
 
-def by_tolstat(names):
+def by_own(names):
     """Whether code with such global names is not that of a library, which knows the system that it is on."""
-    return names.get("__name__", "").startswith("tolstat")
+    return names.get("__name__", "").startswith(("tolstat", "tests"))
 
 
 def hide(module, names):
@@ -40,7 +40,7 @@ def hide(module, names):
     kept = {name: vars(module).pop(name) for name in names if hasattr(module, name)}
 
     def find(name):
-        if name not in kept or by_tolstat(sys._getframe(1).f_globals):
+        if name not in kept or by_own(sys._getframe(1).f_globals):
             raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}", name=name, obj=module)
         return kept[name]
 
@@ -52,7 +52,7 @@ def take_away():
     real = builtins.__import__
 
     def imported(name, names=None, *rest, **options):
-        if name in MODULES and by_tolstat(names or {}):
+        if name in MODULES and by_own(names or {}):
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
         return real(name, names, *rest, **options)
 
@@ -110,7 +110,7 @@ def files_in_use_stay():
     open_handle, release = os.open, filelock.FileLock._release
 
     def opened(path, *arguments, **options):
-        if os.path.isdir(path) and by_tolstat(sys._getframe(1).f_globals):
+        if os.path.isdir(path) and by_own(sys._getframe(1).f_globals):
             raise PermissionError(13, "Permission denied", path)
         return open_handle(path, *arguments, **options)
 

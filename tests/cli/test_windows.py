@@ -100,6 +100,17 @@ def test_slices_are_merged(folder: Path, whole: Path) -> None:
 
 @needs_linux
 @pytest.mark.slow
+def test_a_campaign_grows(folder: Path) -> None:
+    for number, name in ((20, "grown.h5"), (40, "forty.h5")):
+        command(folder, "run", "few.toml", "--n", str(number), "--out", name)
+    command(folder, "extend", "grown.h5", "--n", "40")
+    grown, expected = datasets(folder / "grown.h5"), datasets(folder / "forty.h5")
+    assert {name for name in expected if grown[name] != expected[name]} <= {"metadata"}
+    assert done(folder / "grown.h5") == 41
+
+
+@needs_linux
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("distributed") is None, reason="needs Dask")
 def test_a_cluster_gives_the_same_bytes(folder: Path, whole: Path) -> None:
     command(folder, "run", "few.toml", "--out", "cluster.h5", "--executor", "dask", "--workers", "2")

@@ -124,7 +124,12 @@ def grow(
     tables = {"errors": chain(_blocks(store, store.errors), errors)}
     if origin is not None:
         tables["origin"] = chain(_blocks(store, store.origin), origin)
-    write_new(store.path, document, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
+
+    def fill(file: h5py.File) -> None:
+        _copy_results(file, [store])
+        store.release()
+
+    write_new(store.path, document, OTHER_FILE, tables, fill, overwrite=True)
 
 
 def merge(paths: Sequence[str | Path], out: str | Path) -> Merged:

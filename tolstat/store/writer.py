@@ -143,6 +143,10 @@ class Writer(Reader):
             if self.is_open:
                 self.finish()
 
+    def release(self) -> None:
+        """Close the file, which stays locked until `close`: Windows replaces no file that is open."""
+        self._checked.close()
+
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         """Write the results of `rows` at the operating point; on return they are on disk and no longer pending.
 

@@ -34,7 +34,7 @@ GOLDEN, BEFORE = make_golden.FOLDER / make_golden.PRESENT, make_golden.FOLDER / 
 
 
 def test_a_released_file_is_read() -> None:
-    expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row")
+    expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row", float_precision="round_trip")
     with ResultFile.open(GOLDEN) as store:
         frame = store.to_pandas(nominal=True)
         assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
